@@ -60,7 +60,8 @@ void announce(terminal::Console& console, const StageStatus& s, bool dry_run) {
       console.info(fmt::format("{:<14} not run: {}", s.stage, s.why));
       break;
     case StageState::failed:
-      console.info(fmt::format("{:<14} failed: {}", s.stage, s.error->message()));
+      // What to do comes last, where the program ends with it.
+      console.info(fmt::format("{:<14} failed: {}", s.stage, s.error->found));
       break;
   }
 }

@@ -98,12 +98,13 @@ Status check_places(const fs::path& out, const std::string& stage) {
 }
 
 void keep_failed(const fs::path& from, const fs::path& out, const std::string& stage,
-                 const Error& error) {
+                 Error& error) {
   const nlohmann::json why = {
       {"stage", stage}, {"error", error.message()}, {"orbitfuse", ORBITFUSE_VERSION}};
   const std::string text = why.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
-  if (write_file_atomic(from / failed_mark, text))
-    (void)replace_folder(from, failed_folder(out, stage));
+  const fs::path kept = failed_folder(out, stage);
+  if (write_file_atomic(from / failed_mark, text) && replace_folder(from, kept))
+    error.remedy += fmt::format("; what it left is in {}", kept.string());
 }
 
 }  // namespace orbitfuse::pipeline

@@ -23,8 +23,9 @@ Status check_places(const std::filesystem::path& out, const std::string& stage);
 std::filesystem::path failed_folder(const std::filesystem::path& out, const std::string& stage);
 /// Why the stage failed that left that folder; empty where none is there, "?" without its mark.
 std::string why_failed(const std::filesystem::path& out, const std::string& stage);
-/// Puts `from` there with a mark that says why; that it can't be kept is no further error.
+/// Puts `from` there with a mark that says why, and the place into the error's remedy; that it
+/// can't be kept is no further error.
 void keep_failed(const std::filesystem::path& from, const std::filesystem::path& out,
-                 const std::string& stage, const Error& error);
+                 const std::string& stage, Error& error);
 
 }  // namespace orbitfuse::pipeline

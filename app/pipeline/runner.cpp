@@ -183,12 +183,12 @@ StageStatus Runner::visit(const Stage& stage) {
   bool unknown = false;
   for (const auto* list : {&stage.needs, &stage.uses})
     for (const std::string& name : *list) unknown = unknown || planned(name);
-  if (!unknown && stage.absent) {
-    if (const auto reason = stage.absent(look)) {
-      status.state = StageState::absent;
-      status.why = *reason;
-      return status;
-    }
+  std::optional<std::string> reason = stage.pointless;
+  if (!reason && !unknown && stage.absent) reason = stage.absent(look);
+  if (reason) {
+    status.state = StageState::absent;
+    status.why = *reason;
+    return status;
   }
   for (const std::string& name : stage.needs)
     if (!is_done(name)) {

@@ -83,7 +83,10 @@ struct Stage {
   std::string inputs_hash = {};  ///< of what it reads from outside out/ (session frames, files)
   /// Runs again although nothing changed (the report describes this very run).
   bool always = false;
-  /// A reason why the data give this stage nothing to do ("the session has no thermal frames").
+  /// Why the session gives this stage nothing to do ("the session has no thermal frames"): known
+  /// before any stage has run.
+  std::optional<std::string> pointless = {};
+  /// The like, as far as what it reads tells, once that is there.
   std::function<std::optional<std::string>(const StageContext&)> absent = {};
   std::function<Result<StageOutput>(const StageContext&)> run = {};
 };

@@ -165,6 +165,44 @@ std::string viewer(const Model& model, const json& views) {
   return html + "</section>\n";
 }
 
+std::string facts_list(const Facts& facts) {
+  std::string html = "<dl>";
+  for (const auto& [key, value] : facts)
+    html += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escape(key), escape(value));
+  return html + "</dl>\n";
+}
+
+/// The words of the tables of attempts.
+std::string pose_terms() {
+  return "<details><summary>Terms</summary>" +
+         facts_list(
+             {{"held",
+               "this attempt's poses are the result: enough views, small residuals, and "
+               "nothing in the stations or the matches speaks against them"},
+              {"px",
+               "root mean square distance between where a point was seen and where the "
+               "poses put it, in pixels of the reduced images that were searched"},
+              {"rays meet at",
+               "median angle between the rays to a point: small ones leave its "
+               "distance open"},
+              {"pairs verified",
+               "pairs of views whose matches agree with one motion of the camera"},
+              {"resection", "a view is added to a finished model by the points that it sees"},
+              {"matched again",
+               "points are looked for along the lines that the model's own poses "
+               "leave for them"},
+              {"patches aligned",
+               "each point's place in each view is that where the image itself "
+               "agrees best with the view it was found in"},
+              {"cross-modal",
+               "thermal views are compared with the edges of the visible scene as "
+               "it looks from their place"},
+              {"doubtful",
+               "kept, although something speaks against the pose: look at it before "
+               "you rely on it"}}) +
+         "</details>\n";
+}
+
 std::string poses_section(const Model& model) {
   if (model.poses.empty()) return {};
   std::string html = "<section aria-labelledby=\"h-poses\"><h2 id=\"h-poses\">Posed views</h2>\n";
@@ -175,6 +213,7 @@ std::string poses_section(const Model& model) {
         "{:.1f}%\"></i></div>\n",
         escape(p.modality), p.posed, p.total, percent(share), p.posed < p.total ? " part" : "",
         100 * share);
+    if (!p.found.empty()) html += fmt::format("<p>{}</p>\n", escape(p.found));
     if (!p.advice.empty()) html += fmt::format("<p class=\"notice\">{}</p>\n", escape(p.advice));
     if (p.ladder.empty()) continue;
     html +=
@@ -188,14 +227,7 @@ std::string poses_section(const Model& model) {
           escape(r.name), escape(r.outcome), escape(r.detail));
     html += "</tbody></table></div>\n";
   }
-  return html + "</section>\n";
-}
-
-std::string facts_list(const Facts& facts) {
-  std::string html = "<dl>";
-  for (const auto& [key, value] : facts)
-    html += fmt::format("<dt>{}</dt><dd>{}</dd>\n", escape(key), escape(value));
-  return html + "</dl>\n";
+  return html + pose_terms() + "</section>\n";
 }
 
 std::string registration_section(const Model& model) {

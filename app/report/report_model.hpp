@@ -37,6 +37,7 @@ struct PosesSummary {
   std::string modality;
   int posed = 0, total = 0;
   std::vector<PoseAttempt> ladder;
+  std::string found;   ///< how, how well, and where the files are; empty when none are posed
   std::string advice;  ///< what to do about the missing ones; empty when all are posed
 };
 

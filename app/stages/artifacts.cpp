@@ -77,15 +77,23 @@ Status check_as_written(const pipeline::StageContext& context) {
   return {};
 }
 
-Status save_poses(const fs::path& folder, const Reconstruction& model) {
-  ORBITFUSE_TRY(write_colmap_model(folder / "model", model, ColmapFormat::binary));
+Status save_poses(const pipeline::StageContext& context, const Session& session,
+                  const Reconstruction& model) {
+  ORBITFUSE_TRY(write_colmap_model(context.folder / "model", model, ColmapFormat::binary));
+  // Where the stage's folder will be, not where it is being made.
+  const fs::path there = fs::absolute(context.out / context.folder.filename()).lexically_normal();
+  const fs::path images = fs::absolute(session.folder).lexically_normal();
+  std::map<std::string, std::string> sources;
+  for (const FrameRecord* frame : session.frames_of(model.modality))
+    sources[frame->file] = frame->source;
   Transforms transforms;
   for (const PosedView& view : model.views) {
-    TransformsFrame frame{view.name, {}, view.camera, view.cam_from_world};
-    if (model.modality == Modality::thermal) frame.thermal_file_path = view.name;
+    const std::string file = (images / view.name).lexically_proximate(there).string();
+    TransformsFrame frame{file, {}, view.camera, view.cam_from_world, sources[view.name]};
+    if (model.modality == Modality::thermal) frame.thermal_file_path = file;
     transforms.frames.push_back(std::move(frame));
   }
-  return write_transforms_json(folder / "transforms.json", transforms);
+  return write_transforms_json(context.folder / "transforms.json", transforms);
 }
 
 Result<Reconstruction> load_poses(const fs::path& folder, Modality modality) {

@@ -29,8 +29,10 @@ Status check_up_to_date(const std::filesystem::path& out);
 /// and would be shown as this run's temperatures. Errors: input (which file).
 Status check_as_written(const pipeline::StageContext& context);
 
-/// model/ (COLMAP, binary), transforms.json.
-Status save_poses(const std::filesystem::path& folder, const Reconstruction& model);
+/// Into the stage's folder: model/ (COLMAP, binary; names as in the session), transforms.json
+/// (files as seen from it, with the names that they had before they were imported).
+Status save_poses(const pipeline::StageContext& context, const Session& session,
+                  const Reconstruction& model);
 Result<Reconstruction> load_poses(const std::filesystem::path& folder, Modality modality);
 /// Of the views as the field of this modality sees them: where training moved them, else as posed.
 Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context, Modality modality);

@@ -127,6 +127,9 @@ pipeline::Stage fuse_stage(const StageInputs& in) {
   stage.needs = {"render"};
   stage.options = in.config->settings().to_json("fuse");
   stage.options["min_opacity"] = in.config->render.min_opacity;
+  for (const Modality modality : {Modality::visible, Modality::thermal})
+    if (!in.session->has(modality))
+      stage.pointless = fmt::format("the session has no {} frames", name(modality));
   stage.absent = [](const StageContext& context) -> std::optional<std::string> {
     if (!context.has("render")) return "nothing was rendered";
     const auto rendered = load_rendered_views(context.of("render"));

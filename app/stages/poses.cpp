@@ -9,6 +9,7 @@
 #include "app/stages/stage_list.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
+#include "core/numeric/median.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -35,6 +36,13 @@ std::string held_attempt(const ModalityPoses& poses) {
   for (const LadderStep& step : poses.ladder)
     if (step.held) return step.attempt;
   return "no attempt";
+}
+
+/// Views of one lens share it; of several this is one in the middle.
+double median_focal_px(const std::vector<PosedView>& views) {
+  std::vector<double> focal_px;
+  for (const PosedView& view : views) focal_px.push_back(view.camera.fx);
+  return median(std::move(focal_px));
 }
 
 StageOutput describe(const ModalityPoses& poses, PoseFrame frame) {
@@ -67,6 +75,7 @@ StageOutput describe(const ModalityPoses& poses, PoseFrame frame) {
                     {"points", poses.reconstruction.points.size()},
                     {"shared_frame", frame == PoseFrame::visible},
                     {"gates", poses.gates}};
+  if (posed > 0) output.metrics["focal_px"] = median_focal_px(poses.reconstruction.views);
   return output;
 }
 
@@ -83,9 +92,9 @@ Status save_session_bounds(const StageContext& context, const SessionInput& inpu
   return save_temperature_bounds(context.folder, span.low_k, span.high_k);
 }
 
-Result<StageOutput> finish(const StageContext& context, const ModalityPoses& poses,
-                           PoseFrame frame) {
-  ORBITFUSE_TRY(save_poses(context.folder, poses.reconstruction));
+Result<StageOutput> finish(const StageContext& context, const Session& session,
+                           const ModalityPoses& poses, PoseFrame frame) {
+  ORBITFUSE_TRY(save_poses(context, session, poses.reconstruction));
   ORBITFUSE_TRY(save_pose_frame(context.folder, frame));
   std::error_code ignored;
   std::filesystem::remove_all(context.folder / "work", ignored);
@@ -97,7 +106,7 @@ Result<StageOutput> pose_visible(const StageContext& context, const SessionInput
   ORBITFUSE_ASSIGN(
       const ModalityPoses poses,
       estimate_visible_poses(input.session, options, context.folder / "work", context.progress));
-  return finish(context, poses, PoseFrame::visible);
+  return finish(context, input.session, poses, PoseFrame::visible);
 }
 
 Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput& input,
@@ -117,7 +126,8 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
                    estimate_thermal_poses(input.session, visible ? &scene : nullptr, options,
                                           context.folder / "work", context.progress));
   ORBITFUSE_TRY(save_session_bounds(context, input, poses.reconstruction));
-  return finish(context, poses, poses.shares_visible_frame ? PoseFrame::visible : PoseFrame::own);
+  return finish(context, input.session, poses,
+                poses.shares_visible_frame ? PoseFrame::visible : PoseFrame::own);
 }
 
 bool all_posed(const Session& session) {
@@ -132,9 +142,9 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 15;
+  stage.version = 16;  // transforms.json names files as seen from it
   if (!visible) {
-    stage.version = 19;
+    stage.version = 20;
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session))
@@ -147,10 +157,8 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
     if (const std::string rig = described_rig(in.session->session); !rig.empty())
       stage.options["rig"] = rig;
   stage.inputs_hash = in.session->content.at(modality);
-  stage.absent = [in, modality](const StageContext&) -> std::optional<std::string> {
-    if (in.session->has(modality)) return std::nullopt;
-    return fmt::format("the session has no {} frames", name(modality));
-  };
+  if (!in.session->has(modality))
+    stage.pointless = fmt::format("the session has no {} frames", name(modality));
   stage.run = [in, visible](const StageContext& context) {
     return visible ? pose_visible(context, *in.session, in.config->poses)
                    : pose_thermal(context, *in.session, in.config->poses);

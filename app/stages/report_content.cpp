@@ -10,6 +10,7 @@
 #include "app/stages/metric_scale.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/saved_measurements.hpp"
+#include "core/first_names.hpp"
 #include "core/image/image_io.hpp"
 #include "core/nested_text.hpp"
 #include "core/numeric/percent.hpp"
@@ -93,6 +94,29 @@ std::string advice(const report::PosesSummary& poses) {
                "object give thermal views more to hold on to.";
 }
 
+std::string said_of_doubts(const json& metrics) {
+  const json doubtful = metrics.value("doubtful", json::array());
+  if (doubtful.empty()) return "No view is doubtful.";
+  std::vector<std::string> names;
+  for (const json& view : doubtful) names.push_back(view.value("view", "?"));
+  return fmt::format("{} {} doubtful: {}.", names.size(), names.size() == 1 ? "is" : "are",
+                     first_names(names, 5));
+}
+
+/// "Posed by COLMAP, orbit pairs. Focal length 721.6 px, found to 0.1 %. ..."
+std::string said_of_poses(const json& metrics, const std::string& stage) {
+  std::string said = fmt::format("Posed by: {}.", metrics.value("attempt", "?"));
+  if (const double px = metrics.value("reprojection_rms_px", 0.0); px > 0)
+    said += fmt::format(" {} points, seen to {:.2f} px.", metrics.value("points", 0), px);
+  if (const json focal = metrics.value("focal_px", json()); focal.is_number()) {
+    said += fmt::format(" Focal length {:.1f} px", focal.get<double>());
+    const json sigma = metrics.value("gates", json::object()).value("focal_sigma_percent", json());
+    said += sigma.is_number() ? fmt::format(", found to {:.2g} %.", sigma.get<double>()) : ".";
+  }
+  return said + " " + said_of_doubts(metrics) +
+         fmt::format(" Files: {0}/model (COLMAP), {0}/transforms.json (nerfstudio).", stage);
+}
+
 /// A good model that a later attempt bettered did not fail.
 std::string outcome_of(const json& attempt) {
   if (attempt.value("held", false)) return "held";
@@ -107,7 +131,9 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
     poses.modality = visible ? "Visible" : "Thermal";
     poses.total = input.count(modality);
     if (poses.total == 0) continue;
-    if (const json* m = context.metrics_of("poses_" + std::string(name(modality)))) {
+    const std::string stage = "poses_" + std::string(name(modality));
+    if (const json* m = context.metrics_of(stage)) {
+      poses.found = said_of_poses(*m, stage);
       poses.posed = m->value("posed", 0);
       poses.total = m->value("total", poses.total);
       for (const json& attempt : m->value("ladder", json::array()))

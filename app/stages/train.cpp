@@ -24,8 +24,8 @@ Result<nerf::Field> guide_field(const StageContext& context) {
 }
 
 /// Keeps the poses that training ended with, if it moved them.
-Status take_refined_poses(const nerf::TrainReport& report, const std::filesystem::path& folder,
-                          Reconstruction& model) {
+Status take_refined_poses(const nerf::TrainReport& report, const StageContext& context,
+                          const Session& session, Reconstruction& model) {
   if (report.refined_poses.empty()) return {};
   for (PosedView& view : model.views)
     if (const auto refined = report.refined_poses.find(view.name);
@@ -33,7 +33,7 @@ Status take_refined_poses(const nerf::TrainReport& report, const std::filesystem
       view.cam_from_world = refined->second;
   Reconstruction moved = model;
   moved.points.clear();  // they were where the views had been
-  return save_poses(folder, moved);
+  return save_poses(context, session, moved);
 }
 
 Result<StageOutput> train(const StageContext& context, const SessionInput& input,
@@ -84,7 +84,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
       nerf::train(data, options, context.progress, field, guide.empty() ? nullptr : &guide));
   ORBITFUSE_TRY(field.save(context.folder / field_file));
   ORBITFUSE_TRY(write_json(context.folder / "curve.json", curve_json(report)));
-  ORBITFUSE_TRY(take_refined_poses(report, context.folder, model));
+  ORBITFUSE_TRY(take_refined_poses(report, context, input.session, model));
   auto cloud = nerf::export_point_cloud(field, model.views, config.cloud, context.progress);
   if (cloud) {
     ORBITFUSE_TRY(write_ply(context.folder / cloud_file, *cloud));

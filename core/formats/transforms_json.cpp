@@ -191,6 +191,7 @@ Status write_transforms_json(const std::filesystem::path& file, const Transforms
                 {"p1", c.p1},
                 {"p2", c.p2}};
     if (frame.thermal_file_path) out["thermal_file_path"] = *frame.thermal_file_path;
+    if (!frame.source.empty()) out["source"] = frame.source;
     out["transform_matrix"] = matrix_json(opengl_of_cam_from_world(frame.cam_from_world));
     frames.push_back(std::move(out));
   }

@@ -15,7 +15,8 @@ struct TransformsFrame {
   std::string file_path;                         ///< as written, relative to the JSON
   std::optional<std::string> thermal_file_path;  ///< ThermoNeRF's aligned pairs
   Camera camera;
-  Rigid3d cam_from_world;  ///< axes as in Camera: x right, y down, z forward; the file's unit
+  Rigid3d cam_from_world;   ///< axes as in Camera: x right, y down, z forward; the file's unit
+  std::string source = {};  ///< written only: "folder/name" of the user's own file; empty: none
 };
 
 struct Transforms {

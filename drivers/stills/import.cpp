@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <tuple>
+#include <utility>
 
 #include "capture/recording/frame_encoding.hpp"
 #include "capture/recording/session_folder.hpp"
@@ -223,8 +225,7 @@ class Importer {
     }
     if (group->id.empty()) {
       group->id = device.id = groups_.next_device_id(device.modality);
-      if (device.modality == Modality::thermal && !device.lens.focal_px && !frame.camera)
-        thermal_lens_unknown_ = true;
+      if (!device.lens.focal_px && !frame.camera) lens_unknown_.insert(device.modality);
       if (writer_) ORBITFUSE_TRY(writer_->add_device(device));
     }
     frame.id = group->frames;
@@ -293,6 +294,24 @@ class Importer {
     }
   }
 
+  void tell_unknown_lenses() {
+    for (const Modality modality : lens_unknown_)
+      report_.notes.push_back(fmt::format(
+          "the {0} {1} don't tell their focal length: a run {2}; if you know it, import with "
+          "--{0}-focal-px (image width in pixels / 2 / tan(half the horizontal field of view))",
+          name(modality), modality == Modality::visible ? "photos" : "files",
+          modality == Modality::visible ? "finds it from the images, less surely where they are few"
+                                        : "begins with an assumed one"));
+  }
+
+  void tell_lone_frames() {
+    for (const auto& [modality, count] : {std::pair(Modality::visible, report_.visible),
+                                          std::pair(Modality::thermal, report_.thermal)})
+      if (count == 1)
+        remarks_.add(fmt::format("one {} frame alone can't be posed: add views from other places",
+                                 name(modality)));
+  }
+
   Status finish() {
     ORBITFUSE_TRY(known_fit_.check());
     for (const CameraGroup& group : groups_.all()) {
@@ -307,11 +326,8 @@ class Importer {
     tell_transparent();
     if (options_.embedded_visible && embedded_ == 0)
       remarks_.add("no thermal image has a photo embedded: there are no visible frames from them");
-    if (thermal_lens_unknown_)
-      report_.notes.emplace_back(
-          "the thermal files don't tell their focal length: a run begins with an assumed one; if "
-          "you know it, import with --thermal-focal-px (image width in pixels / 2 / tan(half the "
-          "horizontal field of view))");
+    tell_unknown_lenses();
+    tell_lone_frames();
     if (report_.has_temperatures) {
       report_.kelvin_per_count = decoder_.kelvin_per_count();
     }
@@ -339,7 +355,7 @@ class Importer {
   std::optional<Error> first_failure_;  ///< of the modality that is being added
   ImportReport report_;
   std::vector<std::string> transparent_;  ///< names and shares of images with alpha
-  bool thermal_lens_unknown_ = false;
+  std::set<Modality> lens_unknown_;
   int embedded_ = 0;  ///< photos found in radiometric JPEGs
 };
 

@@ -70,7 +70,7 @@ class VisibleLadder {
     if (!quick && quick.error().kind != ErrorKind::quality) return tl::unexpected(quick.error());
     if (!quick) {
       selection_.note_fallen("COLMAP, orbit pairs", quick.error().found);
-      return none_held(steps_, Modality::visible);
+      return none_held(steps_, Modality::visible, workdir_);
     }
     ORBITFUSE_TRY(look_at_features(*quick));
     tell(1, "matches of the orbit's pairs");
@@ -369,7 +369,7 @@ class VisibleLadder {
 
   Result<ModalityPoses> answer(int pairs) {
     if (!selection_.has_best()) {
-      auto error = none_held(steps_, Modality::visible);
+      auto error = none_held(steps_, Modality::visible, workdir_);
       for (const std::string& file : featureless_)
         error.value().found += fmt::format("; {} {}", file, featureless_why);
       if (std::none_of(frames_.begin(), frames_.end(),

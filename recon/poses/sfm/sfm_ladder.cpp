@@ -9,6 +9,7 @@
 #include <numbers>
 #include <set>
 
+#include "core/system/file_io.hpp"
 #include "recon/poses/frame_camera.hpp"
 #include "recon/poses/sfm/bundle_adjustment.hpp"
 #include "recon/poses/sfm/colmap.hpp"
@@ -191,10 +192,32 @@ Result<ModalityPoses> adjust_model(Reconstruction model, const Session& session,
   return poses;
 }
 
-tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality) {
-  std::string found;
-  for (const LadderStep& step : steps)
-    found += fmt::format("{}{}: {}", found.empty() ? "" : "; ", step.attempt, step.why);
+namespace {
+
+/// The attempt that posed the most views; of several the first.
+const LadderStep& nearest_of(const std::vector<LadderStep>& steps) {
+  return *std::max_element(
+      steps.begin(), steps.end(),
+      [](const LadderStep& a, const LadderStep& b) { return a.posed < b.posed; });
+}
+
+std::string one_line(const LadderStep& step) {
+  return fmt::format("{}: {}", step.attempt, step.why);
+}
+
+}  // namespace
+
+tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality,
+                                const fs::path& workdir) {
+  std::string found = one_line(nearest_of(steps));
+  if (steps.size() > 1) {
+    std::string list;
+    for (const LadderStep& step : steps) list += one_line(step) + "\n";
+    // It says more, and nothing less without it.
+    (void)write_file_atomic(workdir / attempts_file, list);
+    found = fmt::format("none of {} attempts held (each of them: {}); the nearest, {}",
+                        steps.size(), (workdir.filename() / attempts_file).string(), found);
+  }
   return fail(ErrorKind::quality, fmt::format("poses.{}", name(modality)), found,
               modality == Modality::visible
                   ? "take sharp views every 10-15 deg with textured surroundings in sight, or "
@@ -208,11 +231,18 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
   poses.gates["posed_ratio"] = poses.posed_ratio();
   why = fmt::format("{}/{} views", posed, poses.frame_count);
   bool good = poses.posed_ratio() >= options.min_posed_ratio;
+  if (!good)
+    why += fmt::format(" (too few: {:.0f} % are asked for, poses.min_posed_ratio)",
+                       100 * options.min_posed_ratio);
 
   const double rms = poses.gates["reprojection_rms_proxy_px"];
   why += fmt::format(", {:.2f} px, rays meet at {:.0f} deg", rms,
                      poses.gates["median_triangulation_deg"]);
-  good = good && rms <= options.max_reprojection_rms_px;
+  if (!(rms <= options.max_reprojection_rms_px)) {
+    why += fmt::format(" (at most {:.2f} px are believed, poses.max_reprojection_rms_px)",
+                       options.max_reprojection_rms_px);
+    good = false;
+  }
 
   if (const auto fit = fit_stations(poses.reconstruction.views, session)) {
     // Chord of the median residual, in radii.
@@ -223,7 +253,13 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
     why += fmt::format(", {:.1f} deg from the stations in the median, {} of {} contradict them{}",
                        fit->median_residual_deg, fit->outliers, fit->views,
                        fit->mirrored ? " (which run the other way round)" : "");
-    good = good && residual <= options.max_station_residual && outliers <= max_contradicting;
+    if (!(residual <= options.max_station_residual && outliers <= max_contradicting)) {
+      why += fmt::format(
+          " (believed are {:.0f} % of the radius, poses.max_station_residual, and "
+          "{:.0f} % of the views)",
+          100 * options.max_station_residual, 100 * max_contradicting);
+      good = false;
+    }
   }
   const CaptureOrder order = capture_order(poses.reconstruction.views, session);
   if (order.steps >= 8) {
@@ -320,7 +356,7 @@ Result<ModalityPoses> structure_from_motion(const Session& session,
       ORBITFUSE_TRY(progress.check(stage));
     }
   }
-  return none_held(steps, modality);
+  return none_held(steps, modality, workdir);
 }
 
 }  // namespace orbitfuse

@@ -38,8 +38,13 @@ Result<JudgedModel> judge_model(Reconstruction model, const Session& session,
                                 const std::vector<const FrameRecord*>& frames,
                                 const PoseOptions& options, BundleOptions bundle = {});
 
-/// The error of a ladder of which no attempt held.
-tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality);
+/// All attempts of a ladder that failed, a line each, in its work folder.
+constexpr const char* attempts_file = "attempts.txt";
+
+/// The error of a ladder of which no attempt held, by the one that posed the most views; all of
+/// them are listed in `attempts_file`. `steps`: at least one.
+tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality,
+                                const std::filesystem::path& workdir);
 
 /// The gates a model must pass without ground truth; `why` says the figures either way.
 /// Fills poses.gates.

@@ -291,6 +291,8 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   ASSERT_EQ(run({}, {}, "poses").code, 0);
   auto cameras = read_transforms_json(out / "poses_visible/transforms.json");
   ASSERT_TRUE(cameras);
+  for (const TransformsFrame& frame : cameras->frames)
+    EXPECT_TRUE(fs::exists(out / "poses_visible" / frame.file_path)) << frame.file_path;
   cameras->frames.resize(1);
   cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(40, 30);
   ASSERT_TRUE(write_transforms_json(temp.path() / "cameras.json", *cameras));

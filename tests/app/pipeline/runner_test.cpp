@@ -369,6 +369,21 @@ TEST(Runner, AbsentIsNotAFailure) {
   EXPECT_EQ(summary.find("beside")->state, StageState::ran);
 }
 
+TEST(Runner, WhatTheSessionRulesOutIsNotPlannedBehindStagesThatAre) {
+  const test::TempFolder temp;
+  Stage before{.name = "visible"};
+  Stage pointless{.name = "thermal", .uses = {"visible"}, .pointless = "no thermal frames"};
+  Stage behind{.name = "behind", .needs = {"thermal"}};
+  for (Stage* stage : {&before, &pointless, &behind})
+    stage->run = [](const StageContext&) -> Result<StageOutput> { return StageOutput{}; };
+  Runner runner({before, pointless, behind}, {.out = temp.path(), .dry_run = true}, {});
+  const RunSummary summary = runner.run();
+  EXPECT_EQ(summary.find("visible")->state, StageState::planned);
+  EXPECT_EQ(summary.find("thermal")->state, StageState::absent);
+  EXPECT_EQ(summary.find("thermal")->why, "no thermal frames");
+  EXPECT_EQ(summary.find("behind")->state, StageState::absent);
+}
+
 TEST_F(RunnerTest, WhatWasMadeOfEarlierResultsIsNamed) {
   ASSERT_FALSE(run().error);
   const fs::path out = temp.path() / "out";

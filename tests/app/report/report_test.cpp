@@ -40,7 +40,12 @@ Model full_model() {
   view.temperature_k = cv::Mat(60, 80, CV_32FC1, cv::Scalar(300.0));
   view.fused.push_back({"ms-srif", view.visible.clone()});
   m.views.push_back(view);
-  m.poses.push_back({"Thermal", 20, 24, {{"colmap", "failed", "no initial pair"}}, "record more"});
+  m.poses.push_back({"Thermal",
+                     20,
+                     24,
+                     {{"colmap", "failed", "no initial pair"}},
+                     "Posed by: <global> mapper.",
+                     "record more"});
   m.registration_note = "skipped";
   m.tables.push_back(
       {"Fusion", {{"method", ""}, {"Qabf", "Xydeas & Petrovic"}}, {{"ms-srif", "0.65"}}});

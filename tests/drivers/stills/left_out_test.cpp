@@ -217,7 +217,6 @@ TEST_F(LeftOut, FramesBeyondTheDeclaredStationsAreSaidToBeAnotherLoop) {
                                                "the last is 35 degrees from the first"));
   EXPECT_EQ(report->session.frames.at(14).station->loop, 1);
   EXPECT_EQ(report->session.frames.at(14).station->azimuth_deg, 0);
-  EXPECT_TRUE(report->notes.empty());
 }
 
 TEST_F(LeftOut, ARoundedSpacingLeavesNoGapNorDoesOneWithoutFrames) {
@@ -241,6 +240,22 @@ TEST_F(LeftOut, AThermalLensThatNothingTellsIsNotedOnce) {
   std::filesystem::remove_all(folder / "session");
   options.thermal_focal_px = 500;
   EXPECT_TRUE(import()->notes.empty());
+}
+
+TEST_F(LeftOut, AVisibleLensThatNothingTellsIsNotedAndSoIsAPhotoAlone) {
+  put_photo("in/0.jpg", 0);
+  options.visible = {folder / "in"};
+  auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_THAT(report->notes, test::one_says("--visible-focal-px", "finds it from the images"));
+  EXPECT_THAT(report->warnings, test::one_says("one visible frame alone can't be posed"));
+  std::filesystem::remove_all(folder / "session");
+  put_photo("in/1.jpg", 1);
+  options.visible_focal_px = 500;
+  report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_TRUE(report->notes.empty());
+  EXPECT_THAT(report->warnings, test::none_says("can't be posed"));
 }
 
 TEST_F(LeftOut, StationsOfWhatWasNotGivenAreNoWarningAndARigOfOneCameraIs) {
