@@ -80,9 +80,11 @@ Status check_as_written(const pipeline::StageContext& context) {
 Status save_poses(const pipeline::StageContext& context, const Session& session,
                   const Reconstruction& model) {
   ORBITFUSE_TRY(write_colmap_model(context.folder / "model", model, ColmapFormat::binary));
-  // Where the stage's folder will be, not where it is being made.
-  const fs::path there = fs::absolute(context.out / context.folder.filename()).lexically_normal();
-  const fs::path images = fs::absolute(session.folder).lexically_normal();
+  // Where the stage's folder will be, not where it is being made; without links, which ".." of a
+  // relative path would not come back from.
+  std::error_code unreadable;
+  const fs::path there = fs::weakly_canonical(context.out, unreadable) / context.folder.filename();
+  const fs::path images = fs::weakly_canonical(session.folder, unreadable);
   std::map<std::string, std::string> sources;
   for (const FrameRecord* frame : session.frames_of(model.modality))
     sources[frame->file] = frame->source;
@@ -126,6 +128,8 @@ Result<TrainedFrames> load_trained_frames(const fs::path& folder) {
   const JsonFields metrics = metric_fields(record, folder);
   TrainedFrames frames;
   ORBITFUSE_TRY(metrics.get_all("heldout", frames.heldout, "width_px", frames.width_px));
+  if (metrics.has("shading_k"))
+    ORBITFUSE_TRY(metrics.get("shading_k", frames.shading_k));  // 2026-11
   ORBITFUSE_ASSIGN(const JsonFields gains, metrics.child("image_gains"));
   for (const std::string& view : gains.keys())
     ORBITFUSE_TRY(gains.get(view.c_str(), frames.gains[view]));

@@ -67,7 +67,8 @@ struct TrainedFrames {
   /// R, G, B of a frame against the common exposure; of the others it was steady.
   std::map<std::string, std::array<double, 3>> gains;
   std::map<std::string, double> offsets_k;  ///< the camera's drift in a frame; of the others none
-  std::vector<std::string> heldout;         ///< that the field did not learn from
+  double shading_k = 0;              ///< nerf::shading_image(): in every frame, not in the field
+  std::vector<std::string> heldout;  ///< that the field did not learn from
   int width_px = 0;
 };
 /// `folder`: of the finished training. Errors: input (its record is cut or of another version).

@@ -52,8 +52,12 @@ Status add_thermal(const pipeline::StageContext& context, const Session& session
     frame.radiometry = record->radiometry;
     parts.frames.push_back(std::move(frame));
   }
-  parts.read_frame = [root = session.folder](const ThermalFrame& frame) {
-    return read_thermal_k(root / frame.view.name);
+  ORBITFUSE_ASSIGN(const TrainedFrames trained, load_trained_frames(context.of("train_thermal")));
+  parts.read_frame = [root = session.folder,
+                      shading_k = trained.shading_k](const ThermalFrame& frame) -> Result<cv::Mat> {
+    ORBITFUSE_ASSIGN(cv::Mat kelvin, read_thermal_k(root / frame.view.name));
+    if (shading_k != 0) kelvin -= nerf::shading_image(shading_k, kelvin.size());
+    return kelvin;
   };
   return {};
 }

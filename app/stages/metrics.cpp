@@ -80,9 +80,12 @@ Status score_field(const StageContext& context, const StageInputs& in, Modality 
       truth.convertTo(truth, CV_8U, 255);
       rendered.convertTo(rendered, CV_8U, 255);
     } else {
+      // The frame's lens shows what the field is without.
+      const cv::Mat shading = nerf::shading_image(trained.shading_k, rendered.size());
+      rendered = rendered + shading;
       if (input.has_temperatures()) {
         thermal_k.shown.add(truth, rendered);
-        thermal_k.field_alone.add(truth, field_alone);
+        thermal_k.field_alone.add(truth, field_alone + shading);
       }
       const TemperatureSpan span = common_span({truth}, 0, 100);
       truth = gray_of_kelvin(truth, span);
@@ -174,7 +177,7 @@ Result<StageOutput> score(const StageContext& context, const StageInputs& in) {
 pipeline::Stage metrics_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "metrics";
-  stage.version = 5;  // edges through glibc's vector exp and atan
+  stage.version = 6;  // thermal frames' shading
   stage.options = in.config->settings().to_json("metrics");
   stage.uses = {"poses_visible", "poses_thermal", "train_visible",
                 "train_thermal", "render",        "fuse"};

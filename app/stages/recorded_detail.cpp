@@ -13,10 +13,11 @@
 namespace orbitfuse::stages {
 namespace {
 
-/// What training found of one frame alone.
+/// What training found of one frame, and its field is without.
 struct OwnOfFrame {
   std::array<double, 3> gain = {1, 1, 1};  ///< R, G, B against the common exposure
   double offset_k = 0;                     ///< the camera's drift
+  double shading_k = 0;                    ///< the lens', of all frames
 };
 
 /// `camera` may be smaller than `recorded`, the frame's own.
@@ -29,7 +30,7 @@ Result<cv::Mat> image_of(const std::filesystem::path& file, Samples samples, con
   if (samples == Samples::color)
     nerf::even_out(image, Eigen::Array3d(own.gain[0], own.gain[1], own.gain[2]));
   else
-    image -= own.offset_k;
+    image -= nerf::shading_image(own.shading_k, image.size()) + own.offset_k;
   return image;
 }
 
@@ -64,6 +65,7 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
     const Camera recorded = view.camera;
     view.camera = narrowed_to(recorded, width_px);
     OwnOfFrame own;
+    own.shading_k = trained.shading_k;
     if (const auto gain = trained.gains.find(view.name); gain != trained.gains.end())
       own.gain = gain->second;
     if (const auto offset = trained.offsets_k.find(view.name); offset != trained.offsets_k.end())

@@ -116,7 +116,7 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "train_" + modality_name;
-  stage.version = 5;
+  stage.version = visible ? 5 : 6;  // frames without the lens' shading
   stage.needs = {"poses_" + modality_name};
   stage.uses = {visible ? "depth" : "train_visible"};
   stage.options = in.config->settings().to_json("train." + modality_name);

@@ -91,7 +91,8 @@ json metrics_json(const nerf::TrainReport& report) {
           {"samples", report.samples},
           {"samples_per_ray", report.samples_per_ray()},
           {"image_gains", report.image_gains},
-          {"image_offsets_k", report.image_offsets_k}};
+          {"image_offsets_k", report.image_offsets_k},
+          {"shading_k", report.shading_k}};
 }
 
 Result<int> extend_training(const pipeline::StageContext& context, const json& options,

@@ -44,6 +44,7 @@ void print_curve(const nerf::TrainReport& report) {
              1e6 * report.cpu_s / static_cast<double>(report.samples));
   for (const auto& [view, gain] : report.image_gains)
     fmt::print("exposure of {}: {:.3f}\n", view, fmt::join(gain, " "));
+  if (report.shading_k != 0) fmt::print("shading: {:+.3f} K at the sides\n", report.shading_k);
   for (const auto& skip : report.skips) fmt::print("skip {}: {}\n", skip.what, skip.why);
 }
 
@@ -129,8 +130,11 @@ Status print_errors(const nerf::Field& field, const nerf::Dataset& data, const c
 
 /// The same field on the pictures of another size that scene `a.detail` has, without and with the
 /// detail of its views that train.
-Status print_detail_errors(const nerf::Field& field, const Arguments& a) {
-  ORBITFUSE_ASSIGN(const nerf::Dataset full, bench::load_scene(a.detail, a.data, a.model));
+Status print_detail_errors(const nerf::Field& field, const Arguments& a, double shading_k) {
+  ORBITFUSE_ASSIGN(nerf::Dataset full, bench::load_scene(a.detail, a.data, a.model));
+  for (nerf::TrainingView& view : full.views)
+    if (shading_k != 0 && !view.measure_only)
+      view.image = view.image - nerf::shading_image(shading_k, view.image.size());
   ORBITFUSE_ASSIGN(nerf::PhotoDetail detail, bench::detail_of(full, a.detail_options));
   ORBITFUSE_TRY(print_errors(field, full, "field alone"));
   ORBITFUSE_TRY(print_errors(field, full, "with detail", &detail));
@@ -194,7 +198,7 @@ Status run(const Arguments& a) {
   if (a.quick) return {};
   ORBITFUSE_TRY(time_render(field, data));
   ORBITFUSE_TRY(print_errors(field, data, "full resolution"));
-  if (!a.detail.empty()) return print_detail_errors(field, a);
+  if (!a.detail.empty()) return print_detail_errors(field, a, result.report.shading_k);
   return a.images.empty() ? Status{} : bench::write_pictures(field, data, a.images);
 }
 

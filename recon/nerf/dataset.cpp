@@ -76,6 +76,19 @@ cv::Mat rgb_of_bgr8(const cv::Mat& bgr8, cv::Size size) {
   return out;
 }
 
+double shading_r2(double x, double y, cv::Size size) {
+  const double dx = x - 0.5 * size.width, dy = y - 0.5 * size.height;
+  return (dx * dx + dy * dy) / (0.25 * size.width * size.width);
+}
+
+cv::Mat shading_image(double falloff_k, cv::Size size) {
+  cv::Mat image(size, CV_32FC1);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x)
+      image.at<float>(y, x) = static_cast<float>(falloff_k * shading_r2(x + 0.5, y + 0.5, size));
+  return image;
+}
+
 TrainingView resized(const TrainingView& view, int width, int height) {
   TrainingView out = view;
   if (width == view.image.cols && height == view.image.rows) return out;

@@ -52,6 +52,13 @@ cv::Mat rgb_of_bgr8(const cv::Mat& bgr8, cv::Size size = {});
 /// divided by its gains, R, G, B; NaN where the camera clipped what that exposure would have shown.
 void even_out(cv::Mat& image, const Eigen::Array3d& gain);
 
+/// Square of a pixel's distance from the image's middle, in halves of its width.
+double shading_r2(double x, double y, cv::Size size);
+
+/// What a thermal lens' shading adds to an image of this size, kelvin (CV_32FC1): nothing in its
+/// middle, `falloff_k` half a width beside it, and as the square of the distance.
+cv::Mat shading_image(double falloff_k, cv::Size size);
+
 /// The view at another size: area-averaged image and matching camera.
 TrainingView resized(const TrainingView& view, int width, int height);
 

@@ -29,6 +29,9 @@ struct TrainReport : History {
   std::vector<std::string> heldout;  ///< names of the views that measured
   std::map<std::string, double>
       image_offsets_k;  ///< of views that were not dropped (per_image_offset)
+  /// What the lens adds to every view, as shading_image() takes it; 0: not told, or nothing
+  /// (even_shading). The field is without it.
+  double shading_k = 0;
   /// R, G, B of a view against the common exposure, which the field shows (even_exposure); empty:
   /// steady.
   std::map<std::string, std::array<double, 3>> image_gains;

@@ -76,6 +76,7 @@ const std::vector<Entry>& table() {
       FIELD(level_anneal_end, never, 0, 1),
       FIELD(per_image_offset, never),
       FIELD(even_exposure, never),
+      FIELD(even_shading, never),
       FIELD(refine_poses, never),
       FIELD(shared_geometry, never),
   };
@@ -240,6 +241,7 @@ Result<TrainOptions> preset(const std::string& name) {
   o.distortion_weight = 0.002;
   o.depth_weight = 0;
   o.even_exposure = false;
+  o.even_shading = false;
   o.carve = false;
   o.min_views = 0;
   if (name == "nerfacto") return o;

@@ -77,6 +77,9 @@ struct TrainOptions {
   /// Visible views of a camera on automatic are brought to one exposure first, where points that
   /// several see say that it varied (exposure.hpp).
   bool even_exposure = true;
+  /// Thermal views are freed of what their lens takes from the sides first, where a guide's
+  /// geometry says that they see the same points and these tell it (shading.hpp).
+  bool even_shading = true;
   /// Training views move to where the field sees them (pose_steps.hpp). Views that measure follow:
   /// each time after they have.
   bool refine_poses = false;

@@ -7,11 +7,14 @@
 #include <cmath>
 #include <limits>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/system/trace.hpp"
 #include "recon/nerf/device/on_device.hpp"
 #include "recon/nerf/field/checkpoint.hpp"
+#include "recon/nerf/rendering/render.hpp"
 #include "recon/nerf/training/exposure.hpp"
 #include "recon/nerf/training/measure.hpp"
+#include "recon/nerf/training/shading.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -59,6 +62,27 @@ void report_exposure(const Exposure& exposure, const Dataset& dataset, TrainRepo
     const Eigen::Array3d gain = exposure.log_gain[i].exp();
     report.image_gains[dataset.views[i].name] = {gain[0], gain[1], gain[2]};
   }
+}
+
+/// What the guide's surfaces are like from the views that train.
+std::vector<DepthMap> depth_from(const FieldState& guide, const Dataset& data,
+                                 const std::vector<bool>& heldout) {
+  constexpr int width_px = 128;
+  RenderOptions coarse;
+  coarse.sample_factor = 0.5;
+  std::vector<DepthMap> maps;
+  for (std::size_t i = 0; i < data.views.size(); ++i) {
+    if (heldout[i]) continue;
+    const TrainingView& view = data.views[i];
+    DepthMap map;
+    map.view = static_cast<int>(i);
+    map.camera = narrowed_to(view.camera.without_distortion(), width_px);
+    map.depth =
+        render_strided(guide, ViewRays(map.camera, view.cam_from_world, guide.space), 1, coarse)
+            .depth;
+    maps.push_back(std::move(map));
+  }
+  return maps;
 }
 
 /// Whether held-out views at `psnr` end the run.
@@ -139,6 +163,25 @@ void TrainingRun::prepare_views_of_run() {
   }
 }
 
+void TrainingRun::even_shading(const FieldState& guide) {
+  const Shading shading =
+      estimate_shading(data_.dataset, depth_from(guide, data_.dataset, data_.heldout));
+  if (!shading.told()) {
+    report_.skips.push_back(
+        {"even shading",
+         shading.points == 0 || !std::isfinite(shading.sigma_k)
+             ? fmt::format("{} points are seen by two views", shading.points)
+             : fmt::format("{:+.2f} +- {:.2f} K at the sides of the images, on {} points",
+                           shading.falloff_k, shading.sigma_k, shading.points),
+         "images are used as they are"});
+    return;
+  }
+  report_.shading_k = shading.falloff_k;
+  const double per_kelvin = 1 / (state_->span.high - state_->span.low);
+  for (NormalisedView& view : views_)
+    view.target -= shading_image(shading.falloff_k * per_kelvin, view.target.size());
+}
+
 void TrainingRun::show_background() {
   if (!background_) return;
   auto clearance_px = background_->clearance_px.begin();
@@ -156,6 +199,8 @@ Status TrainingRun::prepare(const Field* guide) {
   ORBITFUSE_TRY(create_or_resume());
   ORBITFUSE_TRY(start_geometry(guide));
   prepare_views_of_run();
+  if (options_.even_shading && options_.shared_geometry && !data_.dataset.thermal_is_gray)
+    even_shading(guide->state());
   try {
     trainer_.emplace(*state_, views_, data_.heldout);
     if (trainer_->on_device()) report_.device = device::current()->name();

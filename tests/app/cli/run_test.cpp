@@ -286,13 +286,24 @@ TEST_F(Run, ASessionThatMovedOrWasCopiedGoesOn) {
   EXPECT_EQ(run({"--dry-run"}).code, 0);
 }
 
+TEST_F(Run, FilesOfPosesAreFoundFromAFolderThatIsALink) {
+  write_fixture_session(session);
+  fs::create_directories(temp.path() / "far" / "away" / "results");
+  fs::create_directory_symlink(temp.path() / "far" / "away" / "results", out);
+  ASSERT_EQ(run({}, {}, "poses").code, 0);
+  for (const char* stage : {"poses_visible", "poses_thermal"}) {
+    const auto transforms = read_transforms_json(out / stage / "transforms.json");
+    ASSERT_TRUE(transforms);
+    for (const TransformsFrame& frame : transforms->frames)
+      EXPECT_TRUE(fs::exists(out / stage / frame.file_path)) << frame.file_path;
+  }
+}
+
 TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   write_fixture_session(session);
   ASSERT_EQ(run({}, {}, "poses").code, 0);
   auto cameras = read_transforms_json(out / "poses_visible/transforms.json");
   ASSERT_TRUE(cameras);
-  for (const TransformsFrame& frame : cameras->frames)
-    EXPECT_TRUE(fs::exists(out / "poses_visible" / frame.file_path)) << frame.file_path;
   cameras->frames.resize(1);
   cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(40, 30);
   ASSERT_TRUE(write_transforms_json(temp.path() / "cameras.json", *cameras));

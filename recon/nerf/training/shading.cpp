@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/nerf/training/shading.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/geometry/lens_fold.hpp"
+#include "core/geometry/lifted.hpp"
+#include "core/numeric/median.hpp"
+
+namespace orbitfuse::nerf {
+namespace {
+
+constexpr int step_px = 3;           ///< between the points of a depth map
+constexpr double same_depth = 0.01;  ///< of it
+constexpr double least_facing =
+    0.2;  ///< cosine of the angle to the normal; a sharper limit would choose samples by what
+          ///< explains them, and doubles the falloff (docs/notes/nerf.md)
+constexpr float edge_k = 1.0F;  ///< range of 5x5 pixels: beyond, poses decide what is seen
+constexpr int least_points = 300;
+constexpr double least_k = 0.08;  ///< smaller ones are no more than what the angle leaves over
+constexpr double largest_k = 5;   ///< no shading: a wrong frame, or a lens cap
+constexpr double least_residual_k = 0.05;
+constexpr int groups = 8;   ///< of views, for the jackknife
+constexpr double sure = 3;  ///< sigmas
+
+/// What a sample may have too little or too much by: its place in the image (shading_r2), and how
+/// flat the view is, 1 - cos and its square: surfaces emit less that way, more than any lens does.
+constexpr int causes = 3;
+using Causes = Eigen::Matrix<double, causes, 1>;
+
+struct Sample {
+  int view;
+  double kelvin;
+  Causes by;
+  double weight = 1;
+};
+using Sight = std::vector<Sample>;
+
+/// Mean of 3x3 pixels; none outside the image, beside dead pixels and on edges.
+std::optional<double> kelvin_at(const cv::Mat& image, const Eigen::Vector2d& pixel) {
+  const int x = static_cast<int>(std::floor(pixel.x())),
+            y = static_cast<int>(std::floor(pixel.y()));
+  if (x < 2 || y < 2 || x + 2 >= image.cols || y + 2 >= image.rows) return std::nullopt;
+  float low = image.at<float>(y, x), high = low, sum = 0;
+  for (int dy = -2; dy <= 2; ++dy)
+    for (int dx = -2; dx <= 2; ++dx) {
+      const float k = image.at<float>(y + dy, x + dx);
+      if (!std::isfinite(k)) return std::nullopt;
+      low = std::min(low, k);
+      high = std::max(high, k);
+      if (std::abs(dx) < 2 && std::abs(dy) < 2) sum += k;
+    }
+  if (high - low > edge_k) return std::nullopt;
+  return sum / 9;
+}
+
+/// A place on a surface.
+struct Place {
+  Eigen::Vector3d world, normal;
+};
+
+/// None where the map has no depth, or a step, round the pixel.
+std::optional<Place> place_at(const DepthMap& map, const Rigid3d& world_from_cam, int x, int y) {
+  const Eigen::Vector3d middle = lifted(map.depth, map.camera, x, y);
+  const Eigen::Vector3d across =
+      lifted(map.depth, map.camera, x + 1, y) - lifted(map.depth, map.camera, x - 1, y);
+  const Eigen::Vector3d down =
+      lifted(map.depth, map.camera, x, y + 1) - lifted(map.depth, map.camera, x, y - 1);
+  const Eigen::Vector3d normal = across.cross(down);
+  // Not written as "beyond": NaN fails too.
+  if (!(normal.norm() > 0) || !std::isfinite(normal.norm())) return std::nullopt;
+  return Place{world_from_cam * middle, (world_from_cam.rotation * normal).normalized()};
+}
+
+bool confirms(const DepthMap& map, const Eigen::Vector3d& in_cam) {
+  const Eigen::Vector2d at = map.camera.project(in_cam);
+  if (!(at.x() >= 0 && at.y() >= 0 && at.x() < map.depth.cols && at.y() < map.depth.rows))
+    return false;
+  const float z = map.depth.at<float>(static_cast<int>(at.y()), static_cast<int>(at.x()));
+  return std::abs(z - in_cam.z()) < same_depth * in_cam.z();
+}
+
+std::optional<Sample> seen_by(const Dataset& data, const DepthMap& map, const Place& place) {
+  const TrainingView& view = data.views[static_cast<std::size_t>(map.view)];
+  const Eigen::Vector3d p = view.cam_from_world * place.world;
+  if (!(p.z() > 0) || !lens_holds(view.camera, p) || !confirms(map, p)) return std::nullopt;
+  const Eigen::Vector3d normal = view.cam_from_world.rotation * place.normal;
+  const double facing = std::abs(normal.dot(p.normalized()));
+  if (facing < least_facing) return std::nullopt;
+  const Eigen::Vector2d pixel = view.camera.project(p);
+  const auto kelvin = kelvin_at(view.image, pixel);
+  if (!kelvin) return std::nullopt;
+  const double away = 1 - facing;
+  return Sample{
+      map.view, *kelvin, {shading_r2(pixel.x(), pixel.y(), view.image.size()), away, away * away}};
+}
+
+std::vector<Sight> sights_of(const Dataset& data, const std::vector<DepthMap>& depth) {
+  std::vector<Sight> sights;
+  for (const DepthMap& map : depth) {
+    const Rigid3d world_from_cam =
+        data.views[static_cast<std::size_t>(map.view)].cam_from_world.inverse();
+    for (int y = 1; y + 1 < map.depth.rows; y += step_px)
+      for (int x = 1; x + 1 < map.depth.cols; x += step_px) {
+        const auto place = place_at(map, world_from_cam, x, y);
+        if (!place) continue;
+        Sight sight;
+        for (const DepthMap& other : depth)
+          if (const auto sample = seen_by(data, other, *place)) sight.push_back(*sample);
+        if (sight.size() > 1) sights.push_back(std::move(sight));
+      }
+  }
+  return sights;
+}
+
+/// Weighted means over a sight: what its point's own temperature takes out of the equations.
+struct Means {
+  double weight = 0, kelvin = 0;
+  Causes by = Causes::Zero();
+};
+
+/// The falloff, without the views of group `left_out` (-1: with all). Points are eliminated, so
+/// each turn solves a system of the views' drifts and the causes.
+class Fit {
+ public:
+  Fit(const std::vector<Sight>& sights, int views, int left_out) : views_(views) {
+    for (const Sight& sight : sights) {
+      Sight used;
+      for (const Sample& s : sight)
+        if (left_out < 0 || s.view % groups != left_out) used.push_back(s);
+      if (used.size() > 1) sights_.push_back(std::move(used));
+    }
+  }
+
+  double falloff_k() {
+    constexpr int turns = 10;
+    for (int turn = 0; turn < turns; ++turn) {
+      solve();
+      weigh();
+    }
+    return solution_[views_];  // the first of the causes
+  }
+
+ private:
+  static Means means_of(const Sight& sight) {
+    Means m;
+    for (const Sample& s : sight) m.weight += s.weight;
+    for (const Sample& s : sight) {
+      m.kelvin += s.weight / m.weight * s.kelvin;
+      m.by += s.weight / m.weight * s.by;
+    }
+    return m;
+  }
+
+  void solve() {
+    // Parts of the orbit that nothing ties together each drift by zero in the mean; causes that
+    // nothing tells stay zero.
+    constexpr double prior = 1e-2;
+    const int size = views_ + causes;
+    Eigen::MatrixXd normal = prior * Eigen::MatrixXd::Identity(size, size);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
+    for (const Sight& sight : sights_) {
+      const Means mean = means_of(sight);
+      for (const Sample& s : sight) {
+        const double kelvin = s.weight * (s.kelvin - mean.kelvin);
+        const Causes by = s.by - mean.by;
+        right[s.view] += kelvin;
+        right.tail<causes>() += kelvin * by;
+        normal(s.view, s.view) += s.weight;
+        normal.bottomRightCorner<causes, causes>() += s.weight * by * by.transpose();
+        normal.col(s.view).tail<causes>() += s.weight * by;
+        normal.row(s.view).tail<causes>() += s.weight * by.transpose();
+        for (const Sample& o : sight) normal(s.view, o.view) -= s.weight * o.weight / mean.weight;
+      }
+    }
+    solution_ = normal.ldlt().solve(right);
+  }
+
+  double own_of(const Sample& s) const {
+    return s.kelvin - solution_[s.view] - solution_.tail<causes>().dot(s.by);
+  }
+
+  void weigh() {
+    std::vector<double> sizes;
+    std::vector<double> of_points;
+    for (const Sight& sight : sights_) {
+      double weight = 0, sum = 0;
+      for (const Sample& s : sight) {
+        weight += s.weight;
+        sum += s.weight * own_of(s);
+      }
+      of_points.push_back(sum / weight);
+      for (const Sample& s : sight) sizes.push_back(std::abs(own_of(s) - of_points.back()));
+    }
+    const double usual = std::max(least_residual_k, 1.5 * median(sizes));
+    auto size = sizes.begin();
+    for (Sight& sight : sights_)
+      for (Sample& s : sight) s.weight = std::pow(usual / std::max(usual, *size++), 2);
+  }
+
+  int views_;
+  std::vector<Sight> sights_;
+  Eigen::VectorXd solution_;
+};
+
+}  // namespace
+
+bool Shading::told() const {
+  const double size = std::abs(falloff_k);
+  return size > least_k && size > sure * sigma_k && size < largest_k;
+}
+
+Shading estimate_shading(const Dataset& dataset, const std::vector<DepthMap>& depth) {
+  Shading shading;
+  const std::vector<Sight> sights = sights_of(dataset, depth);
+  shading.points = static_cast<int>(sights.size());
+  if (shading.points < least_points) return shading;
+  const auto views = static_cast<int>(dataset.views.size());
+  shading.falloff_k = Fit(sights, views, -1).falloff_k();
+  std::vector<double> without;
+  double mean = 0, squares = 0;
+  for (int g = 0; g < groups; ++g) {
+    without.push_back(Fit(sights, views, g).falloff_k());
+    mean += without.back() / groups;
+  }
+  for (const double one : without) squares += (one - mean) * (one - mean);
+  shading.sigma_k = std::sqrt(squares * (groups - 1) / groups);
+  return shading;
+}
+
+}  // namespace orbitfuse::nerf
