@@ -59,6 +59,8 @@ std::string TrainReport::brief() const {
   if (std::isfinite(best_psnr))
     text += fmt::format(", held-out {:.2f} dB (step {})", best_psnr, best_step);
   text += fmt::format(", {:.1f} samples a ray, stopped by {}", samples_per_ray(), name(stop));
+  if (shading_k != 0)
+    text += fmt::format(", without the lens' shading ({:+.2f} K at the sides)", shading_k);
   if (skipped_steps > 0) text += fmt::format(", {} steps skipped (not finite)", skipped_steps);
   return text;
 }
