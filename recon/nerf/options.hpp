@@ -27,8 +27,9 @@ struct TrainOptions {
   int holdout_every =
       0;  ///< every n-th view measures and doesn't train (besides measure_only); 0 = none
   double plateau_db = 0;  ///< stop when held-out PSNR is this far below its best; 0 = never
-  bool keep_best = true;  ///< the field is that of the best held-out evaluation
-  int eval_count = 8;     ///< held-out evaluations over the run (0 = only the last)
+  /// The field is that of the last held-out evaluation that is within 0.3 dB of the best.
+  bool keep_best = true;
+  int eval_count = 8;  ///< held-out evaluations over the run (0 = only the last)
 
   // -- determinism, checkpoints --------------------------------------------------------------
   std::uint64_t seed = 1;

@@ -32,13 +32,13 @@ constexpr double sure = 3;  ///< sigmas
 constexpr int causes = 3;
 using Causes = Eigen::Matrix<double, causes, 1>;
 
-struct Sample {
+struct ShadedSample {
   int view;
   double kelvin;
   Causes by;
   double weight = 1;
 };
-using Sight = std::vector<Sample>;
+using ShadedPoint = std::vector<ShadedSample>;
 
 /// Mean of 3x3 pixels; none outside the image, beside dead pixels and on edges.
 std::optional<double> kelvin_at(const cv::Mat& image, const Eigen::Vector2d& pixel) {
@@ -59,12 +59,13 @@ std::optional<double> kelvin_at(const cv::Mat& image, const Eigen::Vector2d& pix
 }
 
 /// A place on a surface.
-struct Place {
+struct SurfacePlace {
   Eigen::Vector3d world, normal;
 };
 
 /// None where the map has no depth, or a step, round the pixel.
-std::optional<Place> place_at(const DepthMap& map, const Rigid3d& world_from_cam, int x, int y) {
+std::optional<SurfacePlace> place_at(const DepthMap& map, const Rigid3d& world_from_cam, int x,
+                                     int y) {
   const Eigen::Vector3d middle = lifted(map.depth, map.camera, x, y);
   const Eigen::Vector3d across =
       lifted(map.depth, map.camera, x + 1, y) - lifted(map.depth, map.camera, x - 1, y);
@@ -73,7 +74,7 @@ std::optional<Place> place_at(const DepthMap& map, const Rigid3d& world_from_cam
   const Eigen::Vector3d normal = across.cross(down);
   // Not written as "beyond": NaN fails too.
   if (!(normal.norm() > 0) || !std::isfinite(normal.norm())) return std::nullopt;
-  return Place{world_from_cam * middle, (world_from_cam.rotation * normal).normalized()};
+  return SurfacePlace{world_from_cam * middle, (world_from_cam.rotation * normal).normalized()};
 }
 
 bool confirms(const DepthMap& map, const Eigen::Vector3d& in_cam) {
@@ -84,7 +85,8 @@ bool confirms(const DepthMap& map, const Eigen::Vector3d& in_cam) {
   return std::abs(z - in_cam.z()) < same_depth * in_cam.z();
 }
 
-std::optional<Sample> seen_by(const Dataset& data, const DepthMap& map, const Place& place) {
+std::optional<ShadedSample> seen_by(const Dataset& data, const DepthMap& map,
+                                    const SurfacePlace& place) {
   const TrainingView& view = data.views[static_cast<std::size_t>(map.view)];
   const Eigen::Vector3d p = view.cam_from_world * place.world;
   if (!(p.z() > 0) || !lens_holds(view.camera, p) || !confirms(map, p)) return std::nullopt;
@@ -95,12 +97,12 @@ std::optional<Sample> seen_by(const Dataset& data, const DepthMap& map, const Pl
   const auto kelvin = kelvin_at(view.image, pixel);
   if (!kelvin) return std::nullopt;
   const double away = 1 - facing;
-  return Sample{
+  return ShadedSample{
       map.view, *kelvin, {shading_r2(pixel.x(), pixel.y(), view.image.size()), away, away * away}};
 }
 
-std::vector<Sight> sights_of(const Dataset& data, const std::vector<DepthMap>& depth) {
-  std::vector<Sight> sights;
+std::vector<ShadedPoint> sights_of(const Dataset& data, const std::vector<DepthMap>& depth) {
+  std::vector<ShadedPoint> sights;
   for (const DepthMap& map : depth) {
     const Rigid3d world_from_cam =
         data.views[static_cast<std::size_t>(map.view)].cam_from_world.inverse();
@@ -108,7 +110,7 @@ std::vector<Sight> sights_of(const Dataset& data, const std::vector<DepthMap>& d
       for (int x = 1; x + 1 < map.depth.cols; x += step_px) {
         const auto place = place_at(map, world_from_cam, x, y);
         if (!place) continue;
-        Sight sight;
+        ShadedPoint sight;
         for (const DepthMap& other : depth)
           if (const auto sample = seen_by(data, other, *place)) sight.push_back(*sample);
         if (sight.size() > 1) sights.push_back(std::move(sight));
@@ -118,19 +120,19 @@ std::vector<Sight> sights_of(const Dataset& data, const std::vector<DepthMap>& d
 }
 
 /// Weighted means over a sight: what its point's own temperature takes out of the equations.
-struct Means {
+struct ShadedMeans {
   double weight = 0, kelvin = 0;
   Causes by = Causes::Zero();
 };
 
 /// The falloff, without the views of group `left_out` (-1: with all). Points are eliminated, so
 /// each turn solves a system of the views' drifts and the causes.
-class Fit {
+class ShadingFit {
  public:
-  Fit(const std::vector<Sight>& sights, int views, int left_out) : views_(views) {
-    for (const Sight& sight : sights) {
-      Sight used;
-      for (const Sample& s : sight)
+  ShadingFit(const std::vector<ShadedPoint>& sights, int views, int left_out) : views_(views) {
+    for (const ShadedPoint& sight : sights) {
+      ShadedPoint used;
+      for (const ShadedSample& s : sight)
         if (left_out < 0 || s.view % groups != left_out) used.push_back(s);
       if (used.size() > 1) sights_.push_back(std::move(used));
     }
@@ -146,10 +148,10 @@ class Fit {
   }
 
  private:
-  static Means means_of(const Sight& sight) {
-    Means m;
-    for (const Sample& s : sight) m.weight += s.weight;
-    for (const Sample& s : sight) {
+  static ShadedMeans means_of(const ShadedPoint& sight) {
+    ShadedMeans m;
+    for (const ShadedSample& s : sight) m.weight += s.weight;
+    for (const ShadedSample& s : sight) {
       m.kelvin += s.weight / m.weight * s.kelvin;
       m.by += s.weight / m.weight * s.by;
     }
@@ -163,9 +165,9 @@ class Fit {
     const int size = views_ + causes;
     Eigen::MatrixXd normal = prior * Eigen::MatrixXd::Identity(size, size);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(size);
-    for (const Sight& sight : sights_) {
-      const Means mean = means_of(sight);
-      for (const Sample& s : sight) {
+    for (const ShadedPoint& sight : sights_) {
+      const ShadedMeans mean = means_of(sight);
+      for (const ShadedSample& s : sight) {
         const double kelvin = s.weight * (s.kelvin - mean.kelvin);
         const Causes by = s.by - mean.by;
         right[s.view] += kelvin;
@@ -174,36 +176,37 @@ class Fit {
         normal.bottomRightCorner<causes, causes>() += s.weight * by * by.transpose();
         normal.col(s.view).tail<causes>() += s.weight * by;
         normal.row(s.view).tail<causes>() += s.weight * by.transpose();
-        for (const Sample& o : sight) normal(s.view, o.view) -= s.weight * o.weight / mean.weight;
+        for (const ShadedSample& o : sight)
+          normal(s.view, o.view) -= s.weight * o.weight / mean.weight;
       }
     }
     solution_ = normal.ldlt().solve(right);
   }
 
-  double own_of(const Sample& s) const {
+  double own_of(const ShadedSample& s) const {
     return s.kelvin - solution_[s.view] - solution_.tail<causes>().dot(s.by);
   }
 
   void weigh() {
     std::vector<double> sizes;
     std::vector<double> of_points;
-    for (const Sight& sight : sights_) {
+    for (const ShadedPoint& sight : sights_) {
       double weight = 0, sum = 0;
-      for (const Sample& s : sight) {
+      for (const ShadedSample& s : sight) {
         weight += s.weight;
         sum += s.weight * own_of(s);
       }
       of_points.push_back(sum / weight);
-      for (const Sample& s : sight) sizes.push_back(std::abs(own_of(s) - of_points.back()));
+      for (const ShadedSample& s : sight) sizes.push_back(std::abs(own_of(s) - of_points.back()));
     }
-    const double usual = std::max(least_residual_k, 1.5 * median(sizes));
+    const double typical = std::max(least_residual_k, 1.5 * median(sizes));
     auto size = sizes.begin();
-    for (Sight& sight : sights_)
-      for (Sample& s : sight) s.weight = std::pow(usual / std::max(usual, *size++), 2);
+    for (ShadedPoint& sight : sights_)
+      for (ShadedSample& s : sight) s.weight = std::pow(typical / std::max(typical, *size++), 2);
   }
 
   int views_;
-  std::vector<Sight> sights_;
+  std::vector<ShadedPoint> sights_;
   Eigen::VectorXd solution_;
 };
 
@@ -216,15 +219,15 @@ bool Shading::told() const {
 
 Shading estimate_shading(const Dataset& dataset, const std::vector<DepthMap>& depth) {
   Shading shading;
-  const std::vector<Sight> sights = sights_of(dataset, depth);
+  const std::vector<ShadedPoint> sights = sights_of(dataset, depth);
   shading.points = static_cast<int>(sights.size());
   if (shading.points < least_points) return shading;
   const auto views = static_cast<int>(dataset.views.size());
-  shading.falloff_k = Fit(sights, views, -1).falloff_k();
+  shading.falloff_k = ShadingFit(sights, views, -1).falloff_k();
   std::vector<double> without;
   double mean = 0, squares = 0;
   for (int g = 0; g < groups; ++g) {
-    without.push_back(Fit(sights, views, g).falloff_k());
+    without.push_back(ShadingFit(sights, views, g).falloff_k());
     mean += without.back() / groups;
   }
   for (const double one : without) squares += (one - mean) * (one - mean);
