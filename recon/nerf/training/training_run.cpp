@@ -96,7 +96,7 @@ std::optional<StopReason> reason_to_stop(const TrainOptions& options, const Snap
 
 /// Whether held-out views are worse than they were by more than two or three of them vary from step
 /// to step (.1 dB on a run of `container`, whose noisier field of step 1800 was taken for that of
-/// step 2400: .13 K farther from the frames). Otherwise the longer trained field is the better one.
+/// step 2400: .11 K farther from the frames). Otherwise the longer trained field is the better one.
 bool fell(const std::vector<CurvePoint>& curve) {
   constexpr double varies_db = 0.3;
   double peak = curve.back().heldout_psnr;
