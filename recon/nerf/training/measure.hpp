@@ -19,4 +19,11 @@ PoseSums sums_of(const RenderedView& picture, int stride, const Space& space,
 double heldout_psnr(FieldState& field, std::vector<NormalisedView>& views,
                     const std::vector<bool>& heldout, bool align);
 
+/// Best held-out PSNR of a curve, dB; -infinity where none is finite.
+double peak_db(const std::vector<CurvePoint>& curve);
+
+/// Whether the curve's last point is worse than its peak by more than two or three views vary from
+/// step to step, or measured nothing. Otherwise the longer trained field is the better one.
+bool fell(const std::vector<CurvePoint>& curve);
+
 }  // namespace orbitfuse::nerf

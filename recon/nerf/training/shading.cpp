@@ -14,8 +14,11 @@
 namespace orbitfuse::nerf {
 namespace {
 
-constexpr int step_px = 3;           ///< between the points of a depth map
-constexpr double same_depth = 0.01;  ///< of it
+/// Between the points of a depth map, at least; more where many views see many of them.
+constexpr int least_step_px = 3;
+constexpr double most_places = 33000;
+constexpr std::size_t most_views = 24;  ///< asked for a place, spread over the orbit
+constexpr double same_depth = 0.01;     ///< of it
 constexpr double least_facing =
     0.2;  ///< cosine of the angle to the normal; a sharper limit would choose samples by what
           ///< explains them, and doubles the falloff (docs/notes/nerf.md)
@@ -24,8 +27,10 @@ constexpr int least_points = 300;
 constexpr double least_k = 0.08;  ///< smaller ones are no more than what the angle leaves over
 constexpr double largest_k = 5;   ///< no shading: a wrong frame, or a lens cap
 constexpr double least_residual_k = 0.05;
-constexpr int groups = 8;   ///< of views, for the jackknife
-constexpr double sure = 3;  ///< sigmas
+/// Of a ball in the middle of a ring r^2 is the angle's: one can't be told from the other.
+constexpr double least_alone = 0.3;  // .89 to .96 on seven orbits
+constexpr int groups = 8;            ///< of views, for the jackknife
+constexpr double sure = 3;           ///< sigmas
 
 /// What a sample may have too little or too much by: its place in the image (shading_r2), and how
 /// flat the view is, 1 - cos and its square: surfaces emit less that way, more than any lens does.
@@ -102,17 +107,25 @@ std::optional<ShadedSample> seen_by(const Dataset& data, const DepthMap& map,
 }
 
 std::vector<ShadedPoint> sights_of(const Dataset& data, const std::vector<DepthMap>& depth) {
+  double pixels = 0;
+  for (const DepthMap& map : depth) pixels += static_cast<double>(map.depth.total());
+  const int step =
+      std::max(least_step_px, static_cast<int>(std::ceil(std::sqrt(pixels / most_places))));
+  const std::size_t asked = std::min(depth.size(), most_views);
   std::vector<ShadedPoint> sights;
-  for (const DepthMap& map : depth) {
+  for (std::size_t own = 0; own < depth.size(); ++own) {
+    const DepthMap& map = depth[own];
     const Rigid3d world_from_cam =
         data.views[static_cast<std::size_t>(map.view)].cam_from_world.inverse();
-    for (int y = 1; y + 1 < map.depth.rows; y += step_px)
-      for (int x = 1; x + 1 < map.depth.cols; x += step_px) {
+    for (int y = 1; y + 1 < map.depth.rows; y += step)
+      for (int x = 1; x + 1 < map.depth.cols; x += step) {
         const auto place = place_at(map, world_from_cam, x, y);
         if (!place) continue;
         ShadedPoint sight;
-        for (const DepthMap& other : depth)
-          if (const auto sample = seen_by(data, other, *place)) sight.push_back(*sample);
+        for (std::size_t k = 0; k < asked; ++k)
+          if (const auto sample =
+                  seen_by(data, depth[(own + k * depth.size() / asked) % depth.size()], *place))
+            sight.push_back(*sample);
         if (sight.size() > 1) sights.push_back(std::move(sight));
       }
   }
@@ -147,6 +160,9 @@ class ShadingFit {
     return solution_[views_];  // the first of the causes
   }
 
+  /// Share of the falloff's variation that neither drift nor angle could stand for.
+  double alone() const { return alone_; }
+
  private:
   static ShadedMeans means_of(const ShadedPoint& sight) {
     ShadedMeans m;
@@ -180,7 +196,10 @@ class ShadingFit {
           normal(s.view, o.view) -= s.weight * o.weight / mean.weight;
       }
     }
-    solution_ = normal.ldlt().solve(right);
+    const Eigen::LDLT<Eigen::MatrixXd> solver = normal.ldlt();
+    solution_ = solver.solve(right);
+    const Eigen::VectorXd answer = solver.solve(Eigen::VectorXd::Unit(size, views_));
+    alone_ = 1 / (normal(views_, views_) * answer[views_]);
   }
 
   double own_of(const ShadedSample& s) const {
@@ -206,6 +225,7 @@ class ShadingFit {
   }
 
   int views_;
+  double alone_ = 0;
   std::vector<ShadedPoint> sights_;
   Eigen::VectorXd solution_;
 };
@@ -214,7 +234,7 @@ class ShadingFit {
 
 bool Shading::told() const {
   const double size = std::abs(falloff_k);
-  return size > least_k && size > sure * sigma_k && size < largest_k;
+  return alone > least_alone && size > least_k && size > sure * sigma_k && size < largest_k;
 }
 
 Shading estimate_shading(const Dataset& dataset, const std::vector<DepthMap>& depth) {
@@ -223,7 +243,9 @@ Shading estimate_shading(const Dataset& dataset, const std::vector<DepthMap>& de
   shading.points = static_cast<int>(sights.size());
   if (shading.points < least_points) return shading;
   const auto views = static_cast<int>(dataset.views.size());
-  shading.falloff_k = ShadingFit(sights, views, -1).falloff_k();
+  ShadingFit fit(sights, views, -1);
+  shading.falloff_k = fit.falloff_k();
+  shading.alone = fit.alone();
   std::vector<double> without;
   double mean = 0, squares = 0;
   for (int g = 0; g < groups; ++g) {

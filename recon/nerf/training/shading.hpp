@@ -15,7 +15,8 @@ struct Shading {
   double falloff_k = 0;  ///< as shading_image() takes it
   double sigma_k =
       std::numeric_limits<double>::infinity();  ///< of it: views left out in turn (jackknife)
-  int points = 0;                               ///< seen by two views or more
+  double alone = 0;  ///< share of r^2's variation that neither drift nor angle can stand for
+  int points = 0;    ///< places of the maps that two views or more see
 
   /// Otherwise images are better left as they are.
   bool told() const;

@@ -64,6 +64,21 @@ void report_exposure(const Exposure& exposure, const Dataset& dataset, TrainRepo
   }
 }
 
+bool dataset_has_kelvin(const Dataset& data) {
+  return data.modality == Modality::thermal && !data.thermal_is_gray;
+}
+
+/// Else there is no one falloff.
+bool of_one_lens(const Dataset& data) {
+  constexpr double same = 0.05;  // focal lengths
+  const Camera& first = data.views[0].camera;
+  return std::all_of(data.views.begin(), data.views.end(), [&](const TrainingView& view) {
+    const Camera& c = view.camera;
+    return c.width == first.width && c.height == first.height &&
+           std::abs(c.fx - first.fx) < same * first.fx;
+  });
+}
+
 /// What the guide's surfaces are like from the views that train.
 std::vector<DepthMap> depth_from(const FieldState& guide, const Dataset& data,
                                  const std::vector<bool>& heldout) {
@@ -86,22 +101,12 @@ std::vector<DepthMap> depth_from(const FieldState& guide, const Dataset& data,
 }
 
 /// Whether held-out views at `psnr` end the run.
-std::optional<StopReason> reason_to_stop(const TrainOptions& options, const Snapshot& best,
-                                         double psnr) {
+std::optional<StopReason> reason_to_stop(const TrainOptions& options,
+                                         const std::vector<CurvePoint>& curve, double psnr) {
   if (options.target_psnr > 0 && psnr >= options.target_psnr) return StopReason::target_psnr;
-  if (options.plateau_db > 0 && !best.empty() && psnr < best.psnr - options.plateau_db)
+  if (options.plateau_db > 0 && psnr < peak_db(curve) - options.plateau_db)
     return StopReason::plateau;
   return std::nullopt;
-}
-
-/// Whether held-out views are worse than they were by more than two or three of them vary from step
-/// to step (.1 dB on a run of `container`, whose noisier field of step 1800 was taken for that of
-/// step 2400: .11 K farther from the frames). Otherwise the longer trained field is the better one.
-bool fell(const std::vector<CurvePoint>& curve) {
-  constexpr double varies_db = 0.3;
-  double peak = curve.back().heldout_psnr;
-  for (const CurvePoint& point : curve) peak = std::max(peak, point.heldout_psnr);
-  return curve.back().heldout_psnr < peak - varies_db;
 }
 
 /// Progress in words: the last measured error, and the running one of the training views.
@@ -173,19 +178,20 @@ void TrainingRun::prepare_views_of_run() {
   }
 }
 
-void TrainingRun::even_shading(const FieldState& guide) {
+void TrainingRun::even_shading(const Field* guide) {
+  const auto skip = [&](std::string why) {
+    report_.skips.push_back({"even shading", std::move(why), "images are used as they are"});
+  };
+  if (!options_.shared_geometry)
+    return skip("no visible field in the same frame says which points views share");
+  if (!of_one_lens(data_.training)) return skip("the views are of several lenses or sizes");
   const Shading shading =
-      estimate_shading(data_.dataset, depth_from(guide, data_.dataset, data_.heldout));
-  if (!shading.told()) {
-    report_.skips.push_back(
-        {"even shading",
-         shading.points == 0 || !std::isfinite(shading.sigma_k)
-             ? fmt::format("{} points are seen by two views", shading.points)
-             : fmt::format("{:+.2f} +- {:.2f} K at the sides of the images, on {} points",
-                           shading.falloff_k, shading.sigma_k, shading.points),
-         "images are used as they are"});
-    return;
-  }
+      estimate_shading(data_.dataset, depth_from(guide->state(), data_.dataset, data_.heldout));
+  if (!std::isfinite(shading.sigma_k))
+    return skip(fmt::format("only {} places are seen by two views", shading.points));
+  if (!shading.told())
+    return skip(fmt::format("{:+.2f} +- {:.2f} K at the sides of the images, from {} places",
+                            shading.falloff_k, shading.sigma_k, shading.points));
   report_.shading_k = shading.falloff_k;
   const double per_kelvin = 1 / (state_->span.high - state_->span.low);
   for (NormalisedView& view : views_)
@@ -209,8 +215,7 @@ Status TrainingRun::prepare(const Field* guide) {
   ORBITFUSE_TRY(create_or_resume());
   ORBITFUSE_TRY(start_geometry(guide));
   prepare_views_of_run();
-  if (options_.even_shading && options_.shared_geometry && !data_.dataset.thermal_is_gray)
-    even_shading(guide->state());
+  if (options_.even_shading && dataset_has_kelvin(data_.dataset)) even_shading(guide);
   try {
     trainer_.emplace(*state_, views_, data_.heldout);
     if (trainer_->on_device()) report_.device = device::current()->name();
@@ -264,7 +269,8 @@ double TrainingRun::evaluate(double fraction) {
                                    options_.refine_poses && fraction > poses_move_from);
   state_->history.curve.push_back({watch_.cpu_s, watch_.wall_s, state_->step, psnr,
                                    state_->train_psnr, state_->samples_per_ray});
-  if (data_.measuring() && options_.keep_best && !fell(state_->history.curve))
+  if (data_.measuring() && options_.keep_best &&
+      (state_->best.empty() || !fell(state_->history.curve)))
     state_->best = state_->snapshot(psnr);
   tell(fraction, watch_.wall_s);
   watch_.go_on();
@@ -301,7 +307,7 @@ bool TrainingRun::measure_if_due(double fraction_now) {
   while (fraction_now >= next_eval_fraction_) next_eval_fraction_ += 1.0 / evaluations;
   const double psnr = evaluate(fraction_now);
   if (!data_.measuring()) return false;
-  const auto stop = reason_to_stop(options_, state_->best, psnr);
+  const auto stop = reason_to_stop(options_, state_->history.curve, psnr);
   if (stop) report_.stop = *stop;
   return stop.has_value();
 }

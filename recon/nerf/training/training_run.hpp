@@ -64,7 +64,7 @@ class TrainingRun {
   Status create_or_resume();
   Status start_geometry(const Field* guide);
   void prepare_views_of_run();
-  void even_shading(const FieldState& guide);
+  void even_shading(const Field* guide);
   void show_background();  ///< to the views that train
 
   double fraction() const;  ///< place in the schedule

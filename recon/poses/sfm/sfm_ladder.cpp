@@ -213,10 +213,10 @@ tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality m
   if (steps.size() > 1) {
     std::string list;
     for (const LadderStep& step : steps) list += one_line(step) + "\n";
-    // It says more, and nothing less without it.
-    (void)write_file_atomic(workdir / attempts_file, list);
-    found = fmt::format("none of {} attempts held (each of them: {}); the nearest, {}",
-                        steps.size(), (workdir.filename() / attempts_file).string(), found);
+    const bool listed = write_file_atomic(workdir / attempts_file, list).has_value();
+    if (!listed) std::replace(list.begin(), list.end(), '\n', ';');
+    found = fmt::format("none of {} attempts held ({}); the nearest, {}", steps.size(),
+                        listed ? std::string("each of them: ") + attempts_file : list, found);
   }
   return fail(ErrorKind::quality, fmt::format("poses.{}", name(modality)), found,
               modality == Modality::visible

@@ -39,11 +39,12 @@ TEST(NoneHeld, OfOneAttemptTheReasonIsTheMessage) {
   EXPECT_FALSE(std::filesystem::exists(temp.path() / attempts_file));
 }
 
-TEST(NoneHeld, AFolderThatTakesNoFileChangesNothing) {
+TEST(NoneHeld, AFolderThatTakesNoFileLeavesTheListInTheMessage) {
   const Error error = none_held({step("one", 0, "no model"), step("two", 2, "2/6 views")},
                                 Modality::visible, "/dev/null/none")
                           .value();
   EXPECT_THAT(error.found, HasSubstr("the nearest, two: 2/6 views"));
+  EXPECT_THAT(error.found, HasSubstr("one: no model"));
 }
 
 }  // namespace
