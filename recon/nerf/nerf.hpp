@@ -64,8 +64,8 @@ Result<TrainReport> train(const Dataset& dataset, const TrainOptions& options,
 
 /// Writes a finished run as a checkpoint, from which train() with `resume` and more iterations or
 /// budget extends it. It goes on from the field, i.e. the best step's parameters, with the
-/// optimiser's moments of the last step; a field no better on held-out views doesn't replace that
-/// one. Errors: input (an empty field), device.
+/// optimiser's moments of the last step; a field that fell on held-out views (by more than 0.3 dB)
+/// doesn't replace that one. Errors: input (an empty field), device.
 Status save_checkpoint(Field finished, const TrainReport& report,
                        const std::filesystem::path& checkpoint);
 
