@@ -44,7 +44,6 @@ void print_curve(const nerf::TrainReport& report) {
              1e6 * report.cpu_s / static_cast<double>(report.samples));
   for (const auto& [view, gain] : report.image_gains)
     fmt::print("exposure of {}: {:.3f}\n", view, fmt::join(gain, " "));
-  if (report.shading_k != 0) fmt::print("shading: {:+.3f} K at the sides\n", report.shading_k);
   for (const auto& skip : report.skips) fmt::print("skip {}: {}\n", skip.what, skip.why);
 }
 

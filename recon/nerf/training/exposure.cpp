@@ -10,6 +10,7 @@
 #include "core/geometry/lens_fold.hpp"
 #include "core/geometry/lifted.hpp"
 #include "core/numeric/median.hpp"
+#include "recon/nerf/training/confirms.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -74,15 +75,8 @@ Sights sights_of_tracks(const Dataset& data, const std::vector<bool>& heldout) {
 
 /// Points of the depth maps that other maps confirm within 1 %.
 void add_sights_of_depth(const Dataset& data, const std::vector<bool>& heldout, Sights& sights) {
-  const auto confirms = [&](const DepthMap& map, const Eigen::Vector3d& world) {
-    const Eigen::Vector3d p = data.views[static_cast<std::size_t>(map.view)].cam_from_world * world;
-    if (!(p.z() > 0)) return false;
-    const Eigen::Vector2d pixel = map.camera.project(p);
-    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < map.depth.cols &&
-          pixel.y() < map.depth.rows))
-      return false;
-    const float z = map.depth.at<float>(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
-    return std::abs(z - p.z()) < 0.01 * p.z();
+  const auto shows = [&](const DepthMap& map, const Eigen::Vector3d& world) {
+    return confirms(map, data.views[static_cast<std::size_t>(map.view)].cam_from_world * world);
   };
   const auto trains = [&](const DepthMap& map) {
     return !heldout[static_cast<std::size_t>(map.view)];
@@ -103,7 +97,7 @@ void add_sights_of_depth(const Dataset& data, const std::vector<bool>& heldout, 
         for (const DepthMap& other : data.depth) {
           Sample sample{other.view, {}};
           if (trains(other) && sight.samples.size() < most_per_sight &&
-              (&other == &map || confirms(other, sight.position)) &&
+              (&other == &map || shows(other, sight.position)) &&
               seen_from(data.views[static_cast<std::size_t>(other.view)], sight.position,
                         sample.log_value))
             sight.samples.push_back(sample);

@@ -10,6 +10,7 @@
 #include "core/geometry/lens_fold.hpp"
 #include "core/geometry/lifted.hpp"
 #include "core/numeric/median.hpp"
+#include "recon/nerf/training/confirms.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -18,7 +19,6 @@ namespace {
 constexpr int least_step_px = 3;
 constexpr double most_places = 33000;
 constexpr std::size_t most_views = 24;  ///< asked for a place, spread over the orbit
-constexpr double same_depth = 0.01;     ///< of it
 constexpr double least_facing =
     0.2;  ///< cosine of the angle to the normal; a sharper limit would choose samples by what
           ///< explains them, and doubles the falloff (docs/notes/nerf.md)
@@ -82,19 +82,11 @@ std::optional<SurfacePlace> place_at(const DepthMap& map, const Rigid3d& world_f
   return SurfacePlace{world_from_cam * middle, (world_from_cam.rotation * normal).normalized()};
 }
 
-bool confirms(const DepthMap& map, const Eigen::Vector3d& in_cam) {
-  const Eigen::Vector2d at = map.camera.project(in_cam);
-  if (!(at.x() >= 0 && at.y() >= 0 && at.x() < map.depth.cols && at.y() < map.depth.rows))
-    return false;
-  const float z = map.depth.at<float>(static_cast<int>(at.y()), static_cast<int>(at.x()));
-  return std::abs(z - in_cam.z()) < same_depth * in_cam.z();
-}
-
 std::optional<ShadedSample> seen_by(const Dataset& data, const DepthMap& map,
                                     const SurfacePlace& place) {
   const TrainingView& view = data.views[static_cast<std::size_t>(map.view)];
   const Eigen::Vector3d p = view.cam_from_world * place.world;
-  if (!(p.z() > 0) || !lens_holds(view.camera, p) || !confirms(map, p)) return std::nullopt;
+  if (!confirms(map, p) || !lens_holds(view.camera, p)) return std::nullopt;
   const Eigen::Vector3d normal = view.cam_from_world.rotation * place.normal;
   const double facing = std::abs(normal.dot(p.normalized()));
   if (facing < least_facing) return std::nullopt;
