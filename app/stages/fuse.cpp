@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/metric_tables.hpp"
@@ -11,6 +12,7 @@
 #include "app/stages/stage_list.hpp"
 #include "core/image/image_io.hpp"
 #include "core/numeric/percent.hpp"
+#include "core/system/side_by_side.hpp"
 #include "fusion/heat/legend.hpp"
 #include "recon/assembly/training_data.hpp"
 
@@ -74,9 +76,13 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
                      field_image(folder / files.thermal, rendered.samples()));
     ORBITFUSE_ASSIGN(const cv::Mat valid,
                      valid_pixels(folder, files, thermal, config.render.min_opacity));
-    ORBITFUSE_TRY(write_png(context.folder / "thermal" / (files.name + ".png"),
-                            gray_of_kelvin(thermal, rendered.span)));
-    ORBITFUSE_TRY(write_png(context.folder / "measured" / (files.name + ".png"), valid));
+    std::vector<std::function<Status()>> writes;
+    const auto write = [&](const std::string& kind, cv::Mat image) {
+      const auto file = context.folder / kind / (files.name + ".png");
+      writes.emplace_back([file, image = std::move(image)] { return write_png(file, image); });
+    };
+    write("thermal", gray_of_kelvin(thermal, rendered.span));
+    write("measured", valid);
     const double share =
         static_cast<double>(cv::countNonZero(valid)) / static_cast<double>(valid.total());
     measured[files.name] = share;
@@ -87,7 +93,7 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
       FusionReport said;
       const auto image = fuse_view(visible, thermal, valid, rendered, options, said);
       if (!image) return tl::unexpected(image.error());
-      ORBITFUSE_TRY(write_png(context.folder / name(method) / (files.name + ".png"), *image));
+      write(name(method), *image);
       wall_s[name(method)] += said.wall_s;
       ++fused_images;
       if (&files == &rendered.views.front())
@@ -96,6 +102,7 @@ Result<StageOutput> fuse_views(const StageContext& context, const RunConfig& con
           output.skips.push_back(skip);
         }
     }
+    ORBITFUSE_TRY(side_by_side(writes));
     if (cv::countNonZero(valid) == 0)
       output.warnings.push_back(
           files.name + ": the thermal field does not cover this view; the visible one is shown");

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <map>
 #include <opencv2/imgproc.hpp>
 
@@ -13,6 +14,7 @@
 #include "app/stages/stage_list.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/side_by_side.hpp"
 #include "recon/assembly/training_data.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -111,14 +113,21 @@ Result<std::size_t> score_fused(const StageContext& context, int scored_views, M
     ORBITFUSE_TRY(context.progress.check("metrics"));
     context.progress.report(
         {"metrics", static_cast<double>(i), static_cast<double>(scored), {}, files.name});
-    ORBITFUSE_ASSIGN(const cv::Mat visible, read_image(context.of("render") / files.visible));
-    ORBITFUSE_ASSIGN(const cv::Mat thermal,
-                     read_image(context.of("fuse") / "thermal" / (files.name + ".png")));
-    std::vector<cv::Mat> images;
-    for (const std::string& method : methods) {
-      ORBITFUSE_ASSIGN(images.emplace_back(),
-                       read_image(context.of("fuse") / method / (files.name + ".png")));
-    }
+    cv::Mat visible, thermal;
+    std::vector<cv::Mat> images(methods.size());
+    std::vector<std::function<Status()>> reads;
+    const auto read = [&](const std::filesystem::path& file, cv::Mat& image) {
+      reads.emplace_back([file, &image]() -> Status {
+        ORBITFUSE_ASSIGN(image, read_image(file));
+        return {};
+      });
+    };
+    const std::string png = files.name + ".png";
+    read(context.of("render") / files.visible, visible);
+    read(context.of("fuse") / "thermal" / png, thermal);
+    for (std::size_t m = 0; m < methods.size(); ++m)
+      read(context.of("fuse") / methods[m] / png, images[m]);
+    ORBITFUSE_TRY(side_by_side(reads));
     ORBITFUSE_ASSIGN(const auto values, fusion_metrics(visible, thermal, images));
     for (std::size_t m = 0; m < methods.size(); ++m) means.add(methods[m], files.name, values[m]);
   }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -15,6 +16,7 @@
 #include "core/image/palette.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/side_by_side.hpp"
 #include "core/system/trace.hpp"
 #include "fusion/heat/heat.hpp"
 #include "recon/assembly/looked_at.hpp"
@@ -152,15 +154,20 @@ Status write_temperatures(const StageContext& context, const std::vector<Thermal
   std::vector<cv::Mat> kelvin;
   for (const ThermalView& view : temperatures) kelvin.push_back(view.thermal);
   const double kelvin_per_count = kelvin_per_count_for(kelvin);
+  std::vector<std::function<Status()>> writes;
   for (std::size_t i = 0; i < files.size(); ++i) {
-    if (!rendered.thermal_is_gray)
-      ORBITFUSE_TRY(
-          write_thermal_tiff(context.folder / files[i].thermal, kelvin[i], kelvin_per_count));
     files[i].palette = "palette/" + files[i].name + ".png";
-    cv::Mat painted = colorize(kelvin[i], rendered.span, colors);
-    fusion::hatch_unmeasured(painted, kelvin[i]);
-    ORBITFUSE_TRY(write_png(context.folder / files[i].palette, painted));
+    writes.emplace_back([&, i] {
+      cv::Mat painted = colorize(kelvin[i], rendered.span, colors);
+      fusion::hatch_unmeasured(painted, kelvin[i]);
+      return write_png(context.folder / files[i].palette, painted);
+    });
+    if (!rendered.thermal_is_gray)
+      writes.emplace_back([&, i] {
+        return write_thermal_tiff(context.folder / files[i].thermal, kelvin[i], kelvin_per_count);
+      });
   }
+  ORBITFUSE_TRY(side_by_side(writes));
   if (rendered.thermal_is_gray) return {};
   return save_temperature_bounds(context.folder, rendered.span.low_k, rendered.span.high_k);
 }
@@ -187,6 +194,8 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
     std::optional<double> left_s;
     if (done > 0) left_s = clock.wall_s() / done * (total - done);
     context.progress.report({"render", done, total, left_s, view.name});
+    const std::filesystem::path& to = context.folder;
+    std::vector<std::function<Status()>> writes;
     ViewFiles f;
     f.name = view.name;
     cv::Mat depth;
@@ -197,10 +206,10 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
       f.visible = "visible/" + view.name + ".png";
       f.depth = "depth/" + view.name + ".tiff";
       f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
-      ORBITFUSE_TRY(write_png(context.folder / f.visible, bgr8_of_rgb(seen.color)));
       depth = seen.depth;
-      ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, depth));
-      ORBITFUSE_TRY(write_float_tiff(context.folder / f.visible_opacity, seen.opacity));
+      writes.emplace_back([=] { return write_png(to / f.visible, bgr8_of_rgb(seen.color)); });
+      writes.emplace_back([=] { return write_float_tiff(to / f.depth, depth); });
+      writes.emplace_back([=] { return write_float_tiff(to / f.visible_opacity, seen.opacity); });
     }
     if (!fields.thermal.empty()) {
       const Rigid3d cam_from_thermal = frame == Modality::thermal
@@ -216,14 +225,15 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
       if (gray) {
         cv::Mat levels;
         seen.color.convertTo(levels, CV_8U);
-        ORBITFUSE_TRY(write_png(context.folder / f.thermal, levels));
+        writes.emplace_back([=] { return write_png(to / f.thermal, levels); });
       }  // temperatures are written below, when the hottest of all views says in which scale
-      ORBITFUSE_TRY(write_float_tiff(context.folder / f.thermal_opacity, seen.opacity));
+      writes.emplace_back([=] { return write_float_tiff(to / f.thermal_opacity, seen.opacity); });
       if (f.depth.empty()) {
         f.depth = "depth/" + view.name + ".tiff";
-        ORBITFUSE_TRY(write_float_tiff(context.folder / f.depth, seen.depth));
+        writes.emplace_back([=] { return write_float_tiff(to / f.depth, seen.depth); });
       }
     }
+    ORBITFUSE_TRY(side_by_side(writes));
     TransformsFrame entry{
         f.visible.empty() ? f.thermal : f.visible, {}, view.camera, view.cam_from_world};
     if (!f.thermal.empty()) entry.thermal_file_path = f.thermal;

@@ -37,7 +37,8 @@ Status take_refined_poses(const nerf::TrainReport& report, const StageContext& c
 }
 
 Result<StageOutput> train(const StageContext& context, const SessionInput& input,
-                          const TrainConfig& config, Modality modality, const json& resolved) {
+                          const TrainConfig& config, Modality modality, const json& resolved,
+                          nerf::KeptRenders* kept) {
   const std::string poses = "poses_" + std::string(name(modality));
   ORBITFUSE_ASSIGN(Reconstruction model, load_poses(context.of(poses), modality));
   ORBITFUSE_ASSIGN(nerf::Dataset data,
@@ -68,6 +69,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
           {"depth of the thermal views", *own_depth.problem, "the field learns from images alone"});
   }
   options.checkpoint = context.folder / "checkpoint.bin";
+  options.checkpoint_at_end = false;
   options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend
   if (!std::filesystem::exists(options.checkpoint)) {
     ORBITFUSE_ASSIGN(const int done, extend_training(context, resolved, options.checkpoint));
@@ -85,7 +87,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   ORBITFUSE_TRY(field.save(context.folder / field_file));
   ORBITFUSE_TRY(write_json(context.folder / "curve.json", curve_json(report)));
   ORBITFUSE_TRY(take_refined_poses(report, context, input.session, model));
-  auto cloud = nerf::export_point_cloud(field, model.views, config.cloud, context.progress);
+  auto cloud = nerf::export_point_cloud(field, model.views, config.cloud, context.progress, kept);
   if (cloud) {
     ORBITFUSE_TRY(write_ply(context.folder / cloud_file, *cloud));
   } else if (cloud.error().kind == ErrorKind::quality) {
@@ -116,14 +118,15 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "train_" + modality_name;
-  stage.version = visible ? 5 : 6;  // frames without the lens' shading
+  stage.version = visible ? 6 : 7;  // rays drawn evenly, and by texture
   stage.needs = {"poses_" + modality_name};
   stage.uses = {visible ? "depth" : "train_visible"};
   stage.options = in.config->settings().to_json("train." + modality_name);
   stage.options["seed"] = in.config->seed;
   stage.inputs_hash = in.session->content.at(modality);
   stage.run = [in, modality, options = stage.options](const StageContext& context) {
-    return train(context, *in.session, in.config->train(modality), modality, options);
+    return train(context, *in.session, in.config->train(modality), modality, options,
+                 in.where_frames_stand.get());
   };
   return stage;
 }

@@ -43,6 +43,7 @@ struct FinishedRun {
   double radius = 1;   ///< of the recorded cameras round the centre
   PointCloud surface;  ///< colours, temperatures or both
   bool thermal_is_gray = false;
+  double shading_k = 0;  ///< nerf::shading_image(): in every thermal frame, not in the field
   TemperatureSpan span;  ///< the run's, one for all its pictures
   HeatScale heat;
   stages::RunConfig config;

@@ -49,7 +49,8 @@ Result<std::string> photo(const FinishedRun& run, std::size_t index) {
     gray.convertTo(levels, CV_32F);
     parts.add_levels("thermal", levels, true);
   } else {
-    ORBITFUSE_ASSIGN(const cv::Mat recorded_k, read_thermal_k(file));
+    ORBITFUSE_ASSIGN(cv::Mat recorded_k, read_thermal_k(file));
+    recorded_k -= nerf::shading_image(run.shading_k, recorded_k.size());  // as measurements do
     ORBITFUSE_ASSIGN(const cv::Mat kelvin, straight(recorded_k));
     parts.add_levels("thermal", no_wider(kelvin, widest_px, cv::INTER_NEAREST), false);
   }

@@ -35,4 +35,13 @@ ORBITFUSE_HOST_DEVICE inline float random_uniform(std::uint64_t seed, std::uint6
   return uniform01(random_bits(seed, stream, counter));
 }
 
+/// The n-th of numbers that fill [0, 2^64) evenly, whichever stretch of n is looked at: multiples
+/// of an irrational share (Weyl 1916). Those of two shares lie evenly as pairs, too.
+inline constexpr std::uint64_t golden_share = split_mix_step;         ///< 2^64 (sqrt 5 - 1) / 2
+inline constexpr std::uint64_t silver_share = 0x6A09E667F3BCC909ull;  ///< 2^64 (sqrt 2 - 1)
+ORBITFUSE_HOST_DEVICE inline std::uint64_t even_bits(std::uint64_t start, std::uint64_t share,
+                                                     std::uint64_t n) {
+  return start + n * share;
+}
+
 }  // namespace orbitfuse

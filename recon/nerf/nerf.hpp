@@ -106,23 +106,25 @@ struct RenderedView {
 Result<RenderedView> render(const Field& field, const Camera& camera, const Rigid3d& cam_from_world,
                             const RenderOptions& options, const Progress& progress);
 
+struct KeptRenders;
+
 struct ExportOptions {
-  /// Depth maps are rendered at this width: some 60,000 points of 24 views, of which registration
-  /// takes 2,500.
-  int max_width = 200;
+  /// Depth maps are rendered at this width, and every second pixel may be a point: some 250,000 of
+  /// 24 views, of which registration takes 2,500. At DetailOptions::base_width_px the detail of new
+  /// views asks for the same renders.
+  int max_width = 320;
   int min_consistent_views = 2;   ///< other views that must agree with a point's depth
   double depth_tolerance = 0.01;  ///< relative agreement
   double max_distance = 3.0;      ///< from the field's centre, in field radii; sheds background
   double voxel = 0.004;           ///< one point per cube of this size, in field radii; 0 = all
-  /// RenderOptions::alike of the depth maps: between pixels of one surface there is nothing to see.
-  double alike = 0.02;
   Status validate() const;
 };
 
 /// Points with normals from rendered depth, kept where other views agree; colours (visible) or
-/// temperatures (thermal). In the world frame of the views. Errors: usage (options), input (no
-/// view), cancelled.
+/// temperatures (thermal). In the world frame of the views. `kept`: of the field's renders, asked
+/// first and added to; may be null. Errors: usage (options), input (no view), cancelled.
 Result<PointCloud> export_point_cloud(const Field& field, const std::vector<PosedView>& views,
-                                      const ExportOptions& options, const Progress& progress);
+                                      const ExportOptions& options, const Progress& progress,
+                                      KeptRenders* kept = nullptr);
 
 }  // namespace orbitfuse::nerf

@@ -46,6 +46,7 @@ const std::vector<Entry>& table() {
       FIELD(seed, never),
       FIELD(checkpoint, free),
       FIELD(checkpoint_every_s, free, 0),
+      FIELD(checkpoint_at_end, free),
       FIELD(resume, free),
       FIELD(levels, never, 1, 16),
       FIELD(features_per_level, never, 2, 4),
@@ -56,6 +57,7 @@ const std::vector<Entry>& table() {
       FIELD(color_hidden, never, 16, 256),
       FIELD(color_layers, never, 1, 2),
       FIELD(sh_degree, never, 0, 4),
+      FIELD(texture_share, free, 0, 1),
       FIELD(sampling, never),
       FIELD(samples_per_step, free, 256, 1 << 22),
       FIELD(occupancy_resolution, never, 16, 256),
@@ -221,7 +223,8 @@ Result<TrainOptions> preset(const std::string& name) {
     // As published for NeRF-IR: a stronger distortion loss and a smaller output branch.
     o.distortion_weight = 0.01;
     o.color_hidden = 32;
-    o.sh_degree = 0;  // emitted heat hardly depends on the direction
+    o.sh_degree = 0;      // emitted heat hardly depends on the direction
+    o.texture_share = 0;  // what is hot is smooth, too: 7 % worse by texture (docs/notes/nerf.md)
     o.per_image_offset = true;
     o.refine_poses =
         true;  // thermal poses are a third of a degree off where visible ones are exact
@@ -242,6 +245,7 @@ Result<TrainOptions> preset(const std::string& name) {
   o.depth_weight = 0;
   o.even_exposure = false;
   o.even_shading = false;
+  o.texture_share = 0;
   o.carve = false;
   o.min_views = 0;
   if (name == "nerfacto") return o;

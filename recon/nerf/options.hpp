@@ -34,7 +34,8 @@ struct TrainOptions {
   // -- determinism, checkpoints --------------------------------------------------------------
   std::uint64_t seed = 1;
   std::filesystem::path checkpoint;  ///< written atomically; empty = no checkpoints
-  double checkpoint_every_s = 60;    ///< also written on cancel and at the end
+  double checkpoint_every_s = 60;    ///< also written on cancel
+  bool checkpoint_at_end = true;     ///< false: the caller saves the field at once
   /// Go on from `checkpoint` if it exists. Options that free_to_change() may differ from those it
   /// was made with; more iterations or budget_s extend the run (nerf.hpp says how schedules go on).
   bool resume = false;
@@ -51,6 +52,8 @@ struct TrainOptions {
   int sh_degree = 3;          ///< direction encoding: 0 (none) to 4 bands
 
   // -- sampling ------------------------------------------------------------------------------
+  /// Of the rays, by how much the pictures vary round their pixels; the others are drawn alike.
+  double texture_share = 0.5;
   Sampling sampling = Sampling::occupancy;
   /// Rays per step adapt to this. Small: at equal time more steps gain more than steadier ones.
   int samples_per_step = 1 << 12;

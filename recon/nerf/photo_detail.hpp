@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <functional>
-#include <map>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
@@ -12,6 +11,7 @@
 #include "core/geometry/reconstruction.hpp"
 #include "core/progress.hpp"
 #include "recon/nerf/field.hpp"
+#include "recon/nerf/kept_renders.hpp"
 #include "recon/nerf/nerf.hpp"
 
 namespace orbitfuse::nerf {
@@ -24,20 +24,6 @@ struct DetailSource {
   /// The frame's own, of which the view's is a smaller one: whatever the view's size, the field is
   /// rendered by the same camera where it stands.
   Camera recorded = view.camera;
-};
-
-/// What a field shows where its sources stand, by their names: for several details of one field,
-/// which may differ in the width of what they read. Those that no longer fit in `most_bytes` are
-/// rendered each time.
-struct KeptRenders {
-  struct Kept {
-    Camera camera;
-    Rigid3d cam_from_world;
-    RenderedView seen;
-  };
-  std::size_t most_bytes = std::size_t{1} << 28;
-  std::size_t bytes = 0;
-  std::map<std::string, Kept> by_name = {};
 };
 
 struct DetailOptions {
@@ -119,8 +105,6 @@ class PhotoDetail {
   std::vector<Source*> nearest(const Eigen::Vector3d& from, const Eigen::Vector3d& looked_at,
                                const std::string& except);
   Camera base_of(const DetailSource& source) const;
-  Result<RenderedView> render_base(const Field& field, const DetailSource& source,
-                                   const Progress& progress) const;
   Status prepare(const Field& field, const Progress& progress, Source& source) const;
   void forget_old(const std::vector<Source*>& needed);
 

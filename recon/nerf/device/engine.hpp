@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "recon/nerf/field/draw_rules.hpp"
 #include "recon/nerf/field/march_settings.hpp"
 #include "recon/nerf/field/pose_sums.hpp"
 #include "recon/nerf/field/ray.hpp"
@@ -51,7 +52,7 @@ struct FieldNumbers {
   std::vector<float> cell_density, window;
 };
 
-/// One view that may train; pointers are read once.
+/// One view that may train; pointers are read once, as are those of the tiles.
 struct Photo {
   RayNumbers rays;
   const float* lattice = nullptr;   ///< [rows][columns][2]
@@ -66,6 +67,7 @@ struct Photo {
 /// What one step does.
 struct StepPlan {
   int step = 0, rays = 0;
+  std::uint64_t first_ray = 0;  ///< rays of the steps before
   std::uint64_t seed = 0;
   float supervision = 0;  ///< weight of the depth loss
   bool posing = false;    ///< note by how much the views' pictures differ
@@ -131,8 +133,8 @@ class Engine {
  public:
   virtual ~Engine() = default;
   virtual std::string name() const = 0;
-  virtual std::unique_ptr<Steps> steps(const FieldNumbers& field,
-                                       const std::vector<Photo>& photos) = 0;
+  virtual std::unique_ptr<Steps> steps(const FieldNumbers& field, const std::vector<Photo>& photos,
+                                       const PixelTilesView& tiles) = 0;
   virtual std::unique_ptr<Tracer> tracer(const FieldNumbers& field) = 0;
   /// Its kernels one by one, for tests: each call copies there and back.
   virtual Kernels kernels() const = 0;

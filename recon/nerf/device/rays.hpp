@@ -91,11 +91,12 @@ struct DeviceRay {
 struct DrawRays {
   Photos photos;
   const int* training;          ///< their indices
-  const long long* pixel_ends;  ///< running count of their pixels
-  const long long* known_ends;  ///< of those with known distance
+  const long long* known_ends;  ///< running count of their pixels with known distance
   int training_count;
   std::uint64_t seed;
   int step;
+  std::uint64_t first_ray;
+  PixelTilesView tiles;
   bool sparse;        ///< known distances are few points of SfM
   float supervision;  ///< weight of the depth loss
   DeviceRay* rays;
@@ -103,33 +104,40 @@ struct DrawRays {
   ORBITFUSE_HOST_DEVICE void operator()(int i) const {
     DeviceRay& out = rays[i];
     out.there = false;
+    const std::uint64_t ray = first_ray + static_cast<unsigned>(i);
     for (int attempt = 0; attempt < draw_attempts && !out.there; ++attempt) {
       const std::uint64_t key = draw_key(step, i, attempt);
       const std::uint64_t bits = random_bits(seed, pixel_stream, key);
       const bool at_known = sparse && supervision > 0 && i % known_every == 0;
-      const long long* ends = at_known ? known_ends : pixel_ends;
-      const auto pick =
-          static_cast<long long>(bits % static_cast<std::uint64_t>(ends[training_count - 1]));
-      int slot = 0, beyond = training_count;  // the first whose end lies behind the pick
-      while (slot < beyond) {
-        const int middle = (slot + beyond) / 2;
-        if (ends[middle] > pick)
-          beyond = middle;
-        else
-          slot = middle + 1;
-      }
-      const TrainingPhoto& view = photos.view[training[slot]];
-      long long pixel = pick - (slot > 0 ? ends[slot - 1] : 0);
-      if (at_known) pixel = photos.known[view.known + pixel];
-      out.view = training[slot];
-      out.x = static_cast<int>(pixel % view.rays.width);
-      out.y = static_cast<int>(pixel / view.rays.width);
+      const DrawnPixel drawn =
+          at_known ? known_pixel(bits) : pixel_at(tiles, pixel_bits(seed, ray, attempt, bits));
+      const TrainingPhoto& view = photos.view[drawn.view];
+      out.view = drawn.view;
+      out.x = drawn.x;
+      out.y = drawn.y;
+      const long long pixel = static_cast<long long>(drawn.y) * view.rays.width + drawn.x;
       out.there = usable(view, pixel, bits, out);
-      out.jitter = random_uniform(seed, jitter_stream, key);
     }
+    out.jitter = ray_jitter(seed, ray);
   }
 
  private:
+  ORBITFUSE_HOST_DEVICE DrawnPixel known_pixel(std::uint64_t bits) const {
+    const auto pick =
+        static_cast<long long>(bits % static_cast<std::uint64_t>(known_ends[training_count - 1]));
+    int slot = 0, beyond = training_count;  // the first whose end lies behind the pick
+    while (slot < beyond) {
+      const int middle = (slot + beyond) / 2;
+      if (known_ends[middle] > pick)
+        beyond = middle;
+      else
+        slot = middle + 1;
+    }
+    const TrainingPhoto& view = photos.view[training[slot]];
+    const int pixel = photos.known[view.known + pick - (slot > 0 ? known_ends[slot - 1] : 0)];
+    return {training[slot], pixel % view.rays.width, pixel / view.rays.width};
+  }
+
   ORBITFUSE_HOST_DEVICE bool usable(const TrainingPhoto& view, long long pixel, std::uint64_t bits,
                                     DeviceRay& out) const {
     const bool shows_nothing = view.clearance >= 0 && photos.clearance[view.clearance + pixel] >

@@ -9,13 +9,14 @@ namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 /// All photos in one array a kind.
 class PhotoStore {
  public:
-  PhotoStore(const std::vector<device::Photo>& photos, int channels, std::size_t offsets)
-      : channels_(channels) {
+  PhotoStore(const std::vector<device::Photo>& photos, const PixelTilesView& tiles, int channels,
+             std::size_t offsets)
+      : channels_(channels), tile_count_(tiles.count) {
     std::vector<float> target, distance, lattice;
     std::vector<std::int32_t> known;
     std::vector<std::uint8_t> clearance;
     std::vector<int> training;
-    std::vector<long long> pixel_ends, known_ends;
+    std::vector<long long> known_ends;
     long long pixels = 0, known_pixels = 0;
     for (const device::Photo& photo : photos) {
       const long count = static_cast<long>(photo.rays.width) * photo.rays.height;
@@ -23,7 +24,7 @@ class PhotoStore {
                          static_cast<long>(distance.size()), static_cast<long>(known.size()), -1};
       if (photo.trains) {
         training.push_back(static_cast<int>(views_.size()));
-        pixel_ends.push_back(pixels += count);
+        pixels += count;
         known_ends.push_back(known_pixels += photo.known_count);
         const long nodes = static_cast<long>(photo.rays.lattice_columns) * photo.rays.lattice_rows;
         lattice.insert(lattice.end(), photo.lattice, photo.lattice + 2 * nodes);
@@ -48,7 +49,8 @@ class PhotoStore {
     std::vector<int> trains(offsets);
     for (const int view : training) trains[static_cast<std::size_t>(view)] = 1;
     trains_.upload(trains);
-    pixel_ends_.upload(pixel_ends);
+    tiles_.upload({tiles.tiles, tiles.tiles + tiles.count});
+    tile_ends_.upload({tiles.ends, tiles.ends + tiles.count});
     known_ends_.upload(known_ends);
     view_.upload(views_);
   }
@@ -66,18 +68,24 @@ class PhotoStore {
   int count() const { return static_cast<int>(views_.size()); }
   const int* trains() const { return trains_.data(); }  ///< [view, padded as the offsets]
   DrawRays draw(const device::StepPlan& plan, DeviceRay* rays) {
-    return {photos(),           training_.data(),
-            pixel_ends_.data(), known_ends_.data(),
-            training_count,     plan.seed,
-            plan.step,          sparse,
-            plan.supervision,   rays};
+    return {photos(),
+            training_.data(),
+            known_ends_.data(),
+            training_count,
+            plan.seed,
+            plan.step,
+            plan.first_ray,
+            {tiles_.data(), tile_ends_.data(), tile_count_},
+            sparse,
+            plan.supervision,
+            rays};
   }
 
   int training_count = 0;
   bool sparse = false;  ///< known distances are few
 
  private:
-  int channels_;
+  int channels_, tile_count_;
   std::vector<TrainingPhoto> views_;
   bool placed_ = true;
   Buffer<TrainingPhoto> view_;
@@ -85,13 +93,16 @@ class PhotoStore {
   Buffer<std::int32_t> known_;
   Buffer<std::uint8_t> clearance_;
   Buffer<int> training_, trains_;
-  Buffer<long long> pixel_ends_, known_ends_;
+  Buffer<long long> known_ends_;
+  Buffer<PixelTile> tiles_;
+  Buffer<std::uint64_t> tile_ends_;
 };
 
 class TrainingSteps final : public device::Steps {
  public:
-  TrainingSteps(const device::FieldNumbers& field, const std::vector<device::Photo>& photos)
-      : field_(field), photos_(photos, field.channels, field.offsets.value.size()) {
+  TrainingSteps(const device::FieldNumbers& field, const std::vector<device::Photo>& photos,
+                const PixelTilesView& tiles)
+      : field_(field), photos_(photos, tiles, field.channels, field.offsets.value.size()) {
     table_.upload(field.table);
     offsets_.upload(field.offsets);
     allowed_.upload(field.allowed);

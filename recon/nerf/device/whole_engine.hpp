@@ -11,8 +11,9 @@ namespace orbitfuse::nerf::ORBITFUSE_ENGINE {
 class WholeEngine : public device::Engine {
  public:
   std::unique_ptr<device::Steps> steps(const device::FieldNumbers& field,
-                                       const std::vector<device::Photo>& photos) override {
-    return std::make_unique<TrainingSteps>(field, photos);
+                                       const std::vector<device::Photo>& photos,
+                                       const PixelTilesView& tiles) override {
+    return std::make_unique<TrainingSteps>(field, photos, tiles);
   }
   std::unique_ptr<device::Tracer> tracer(const device::FieldNumbers& field) override {
     return std::make_unique<FieldTracer>(field);

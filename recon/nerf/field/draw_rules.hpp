@@ -4,11 +4,12 @@
 #include <cstdint>
 
 #include "core/host_device.hpp"
+#include "core/numeric/random.hpp"
 
 // What the draws of training rays go by, wherever they are made: the same keys give the same rays.
 namespace orbitfuse::nerf {
 
-enum Stream : std::uint64_t { pixel_stream = 1, jitter_stream = 2, probe_stream = 4 };
+enum Stream : std::uint64_t { pixel_stream = 1, even_stream = 2, probe_stream = 4 };
 
 inline constexpr int draw_attempts = 8;  ///< for a ray: pixels that show nothing are passed over
 inline constexpr float known_depth_margin = 1.08f;  ///< a wrong depth must be able to move
@@ -29,6 +30,54 @@ ORBITFUSE_HOST_DEVICE inline std::uint64_t draw_key(int step, int ray, int attem
   const std::uint64_t key =
       static_cast<std::uint64_t>(step) * 1000003u + static_cast<std::uint64_t>(ray);
   return key * draw_attempts + static_cast<unsigned>(attempt);
+}
+
+/// A square of pixels of a view that trains (smaller at the edges), with what each of its pixels
+/// weighs in the draw.
+struct PixelTile {
+  int view, x, y, columns, rows;
+  std::uint32_t weight;
+};
+inline constexpr int tile_px = 8;
+
+/// All tiles' pixels one after the other, as long as they weigh; `ends`: where each tile's end.
+struct PixelTilesView {
+  const PixelTile* tiles;
+  const std::uint64_t* ends;
+  int count;
+};
+struct DrawnPixel {
+  int view, x, y;
+};
+/// `draw` of [0, 2^64).
+ORBITFUSE_HOST_DEVICE inline DrawnPixel pixel_at(const PixelTilesView& of, std::uint64_t draw) {
+  const std::uint64_t all = of.ends[of.count - 1];
+  // One rounding, and so the same on every machine.
+  auto pick = static_cast<std::uint64_t>(static_cast<double>(draw >> 11) * 0x1p-53 *
+                                         static_cast<double>(all));
+  if (pick >= all) pick = all - 1;
+  int low = 0, beyond = of.count;  // the first whose end lies behind the pick
+  while (low < beyond) {
+    const int middle = (low + beyond) / 2;
+    if (of.ends[middle] > pick)
+      beyond = middle;
+    else
+      low = middle + 1;
+  }
+  const PixelTile& tile = of.tiles[low];
+  const auto pixel = static_cast<int>((pick - (low > 0 ? of.ends[low - 1] : 0)) / tile.weight);
+  return {tile.view, tile.x + pixel % tile.columns, tile.y + pixel / tile.columns};
+}
+
+/// What draws a ray's pixel: the first attempts of a run's rays, one after the other, lie evenly
+/// over all pixels, whichever stretch of them is looked at: a run of them learns as much as one of
+/// a quarter more rays at random (docs/notes/nerf.md).
+ORBITFUSE_HOST_DEVICE inline std::uint64_t pixel_bits(std::uint64_t seed, std::uint64_t ray,
+                                                      int attempt, std::uint64_t random) {
+  return attempt > 0 ? random : even_bits(random_bits(seed, even_stream, 0), golden_share, ray);
+}
+ORBITFUSE_HOST_DEVICE inline float ray_jitter(std::uint64_t seed, std::uint64_t ray) {
+  return uniform01(even_bits(random_bits(seed, even_stream, 1), silver_share, ray));
 }
 
 /// Within so many pixels of the object, the background trains with every ray.

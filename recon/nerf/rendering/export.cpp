@@ -4,14 +4,16 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 #include <unordered_set>
 
-#include "core/geometry/lifted.hpp"
+#include "core/geometry/lens_fold.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "core/option_range.hpp"
 #include "core/system/parallel.hpp"
 #include "core/system/trace.hpp"
+#include "recon/nerf/kept_renders.hpp"
 #include "recon/nerf/nerf.hpp"
 #include "recon/nerf/rendering/render.hpp"
 
@@ -19,12 +21,28 @@ namespace orbitfuse::nerf {
 namespace {
 
 struct DepthView {
-  PosedView view;  ///< at the rendered size, without distortion
+  Camera camera;                                             ///< at the rendered size
+  std::shared_ptr<const std::vector<Eigen::Vector3d>> rays;  ///< of its pixels, z = 1
   RenderedView image;
+  Rigid3d world_from_cam;
+  Eigen::Matrix3d rotation;  ///< these two: to the camera
+  Eigen::Vector3d translation;
+  double fold;  ///< fold_of() the camera
 };
 
 Eigen::Vector3d lift(const DepthView& from, int x, int y) {
-  return from.view.cam_from_world.inverse() * lifted(from.image.depth, from.view.camera, x, y);
+  const auto pixel = static_cast<std::size_t>(y * from.camera.width + x);
+  return from.world_from_cam * ((*from.rays)[pixel] * from.image.depth.at<float>(y, x));
+}
+
+std::vector<Eigen::Vector3d> rays_of(const Camera& camera) {
+  std::vector<Eigen::Vector3d> rays(static_cast<std::size_t>(camera.width * camera.height));
+  parallel_blocks(camera.height, 16, [&](int begin, int end) {
+    for (int y = begin; y < end; ++y)
+      for (int x = 0; x < camera.width; ++x)
+        rays[static_cast<std::size_t>(y * camera.width + x)] = camera.ray_of({x + 0.5, y + 0.5});
+  });
+  return rays;
 }
 
 /// Normal by the cross product of central differences; zero beside a depth step or a border.
@@ -37,7 +55,7 @@ Eigen::Vector3d normal_at(const DepthView& from, int x, int y) {
       return Eigen::Vector3d::Zero();
   const Eigen::Vector3d n = (lift(from, x + 1, y) - lift(from, x - 1, y))
                                 .cross(lift(from, x, y + 1) - lift(from, x, y - 1));
-  const Eigen::Vector3d to_camera = camera_center(from.view.cam_from_world) - lift(from, x, y);
+  const Eigen::Vector3d to_camera = from.world_from_cam.translation - lift(from, x, y);
   const double length = n.norm();
   if (!(length > 0)) return Eigen::Vector3d::Zero();
   return n / length * (n.dot(to_camera) < 0 ? -1.0 : 1.0);
@@ -53,8 +71,10 @@ Agreement agreement(const std::vector<DepthView>& views, std::size_t self,
   Agreement result;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (i == self) continue;
-    const Eigen::Vector3d in_cam = views[i].view.cam_from_world * point;
-    const Eigen::Vector2d pixel = views[i].view.camera.project(in_cam);
+    const Eigen::Vector3d in_cam = views[i].rotation * point + views[i].translation;
+    if (!(in_cam.z() > 0)) continue;
+    if (in_cam.head<2>().squaredNorm() >= views[i].fold * in_cam.z() * in_cam.z()) continue;
+    const Eigen::Vector2d pixel = views[i].camera.project(in_cam);
     const cv::Mat& depth = views[i].image.depth;
     if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < depth.cols && pixel.y() < depth.rows))
       continue;
@@ -102,12 +122,12 @@ Status ExportOptions::validate() const {
   ORBITFUSE_TRY(check("min_consistent_views", min_consistent_views, at_least(0)));
   ORBITFUSE_TRY(check("depth_tolerance", depth_tolerance, between(0, 1)));
   ORBITFUSE_TRY(check("max_distance", max_distance, above(0)));
-  ORBITFUSE_TRY(check("alike", alike, from_to(0, 0.5)));
   return check("voxel", voxel, at_least(0));
 }
 
 Result<PointCloud> export_point_cloud(const Field& field, const std::vector<PosedView>& views,
-                                      const ExportOptions& options, const Progress& progress) {
+                                      const ExportOptions& options, const Progress& progress,
+                                      KeptRenders* kept) {
   ORBITFUSE_TRY(options.validate());
   if (views.empty())
     return fail(ErrorKind::input, "export.views", "no camera to see the field from",
@@ -116,12 +136,16 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
   std::vector<DepthView> rendered;
   for (const PosedView& view : views) {
     ORBITFUSE_TRY(progress.check("export"));
-    DepthView out;
-    out.view = view;
-    out.view.camera = narrowed_to(view.camera, options.max_width).without_distortion();
-    ORBITFUSE_ASSIGN(out.image, render(field, out.view.camera, view.cam_from_world,
-                                       {.alike = options.alike}, progress));
-    rendered.push_back(std::move(out));
+    const Camera camera = narrowed_to(view.camera, options.max_width);
+    ORBITFUSE_ASSIGN(RenderedView image,
+                     render_where_it_stands(field, view, camera, kept, progress));
+    // Taking a lens' distortion back takes longer than all else: once for all views of a camera.
+    auto rays = !rendered.empty() && rendered.back().camera == camera
+                    ? rendered.back().rays
+                    : std::make_shared<const std::vector<Eigen::Vector3d>>(rays_of(camera));
+    rendered.push_back({camera, std::move(rays), std::move(image), view.cam_from_world.inverse(),
+                        view.cam_from_world.rotation.toRotationMatrix(),
+                        view.cam_from_world.translation, fold_of(camera)});
     progress.report({"export",
                      static_cast<double>(rendered.size()),
                      static_cast<double>(views.size()),
@@ -139,7 +163,7 @@ Result<PointCloud> export_point_cloud(const Field& field, const std::vector<Pose
     const cv::Mat& depth = rendered[i].image.depth;
     std::vector<std::vector<SurfacePoint>> rows(static_cast<std::size_t>(depth.rows));
     parallel_for(depth.rows, [&](int y) {
-      for (int x = 0; x < depth.cols; ++x) {
+      for (int x = y % 2; x < depth.cols; x += 2) {
         if (!std::isfinite(depth.at<float>(y, x))) continue;
         const Eigen::Vector3d point = lift(rendered[i], x, y);
         if ((point - field.center()).norm() > reach) continue;

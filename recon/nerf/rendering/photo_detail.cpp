@@ -28,8 +28,6 @@ namespace orbitfuse::nerf {
 namespace {
 
 constexpr float levels = 32767;  ///< a difference of the whole value range
-/// Where sources stand: 0.01 dB worse than every pixel all the way, a fifth faster.
-const RenderOptions for_sources = {.alike = 0.01};
 /// Over which share of the width detail ends where no source sees on.
 constexpr double feather = 0.005;
 /// A view's twins, as bursts and brackets have them.
@@ -73,10 +71,6 @@ std::optional<Eigen::Vector3d> looked_at(const Camera& camera, const Rigid3d& wo
   return world_from_cam * (camera.ray_of({0.5 * camera.width, 0.5 * camera.height}) * median(seen));
 }
 
-bool same(const Rigid3d& a, const Rigid3d& b) {
-  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
-}
-
 Result<cv::Mat> image_of(const DetailSource& source) {
   ORBITFUSE_ASSIGN(cv::Mat image, source.image());
   ORBITFUSE_TRY(check_size(image, source.view.camera, source.view.name));
@@ -110,35 +104,14 @@ Camera PhotoDetail::base_of(const DetailSource& source) const {
   return narrowed_to(source.recorded, std::min(options_.base_width_px, source.view.camera.width));
 }
 
-Result<RenderedView> PhotoDetail::render_base(const Field& field, const DetailSource& source,
-                                              const Progress& progress) const {
-  const PosedView& view = source.view;
-  const Camera camera = base_of(source);
-  if (kept_)
-    if (const auto known = kept_->by_name.find(view.name);
-        known != kept_->by_name.end() && known->second.camera == camera &&
-        same(known->second.cam_from_world, view.cam_from_world))
-      return known->second.seen;
-  ORBITFUSE_ASSIGN(RenderedView base,
-                   render(field, camera, view.cam_from_world, for_sources, progress));
-  if (kept_) {
-    const std::size_t bytes =
-        (base.color.total() * base.color.channels() + base.depth.total() + base.opacity.total()) *
-        sizeof(float);
-    if (kept_->bytes + bytes <= kept_->most_bytes &&
-        kept_->by_name.try_emplace(view.name, KeptRenders::Kept{camera, view.cam_from_world, base})
-            .second)
-      kept_->bytes += bytes;
-  }
-  return base;
-}
-
 /// Renders the field where the source stands, and keeps what the source shows beyond that.
 Status PhotoDetail::prepare(const Field& field, const Progress& progress, Source& source) const {
   if (!source.depth.empty()) return {};
   const TraceSpan span("detail of a view");
   ORBITFUSE_ASSIGN(const cv::Mat image, image_of(source.recorded));
-  ORBITFUSE_ASSIGN(const RenderedView base, render_base(field, source.recorded, progress));
+  ORBITFUSE_ASSIGN(const RenderedView base,
+                   render_where_it_stands(field, source.recorded.view, base_of(source.recorded),
+                                          kept_.get(), progress));
   cv::Mat shown;
   cv::resize(base.color, shown, image.size(), 0, 0, cv::INTER_CUBIC);
   const ValueSpan range = field.state().span;

@@ -56,7 +56,8 @@ struct LevelGradient {
 /// The device's copy of the field and its views. Pointers are read at once.
 std::unique_ptr<device::Steps> start_on(device::Engine& engine, const FieldState& field,
                                         const std::vector<NormalisedView>& views,
-                                        const std::vector<bool>& heldout) {
+                                        const std::vector<bool>& heldout,
+                                        const PixelTilesView& tiles) {
   std::vector<device::Photo> photos;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const NormalisedView& view = views[i];
@@ -75,21 +76,24 @@ std::unique_ptr<device::Steps> start_on(device::Engine& engine, const FieldState
     photo.trains = !heldout[i];
     photos.push_back(photo);
   }
-  return engine.steps(device::all_numbers(field), photos);
+  return engine.steps(device::all_numbers(field), photos, tiles);
 }
 
 }  // namespace
 
 Trainer::Trainer(FieldState& field, std::vector<NormalisedView>& views,
                  const std::vector<bool>& heldout, const Kernels& kernels)
-    : field_(field), views_(views), kernels_(kernels) {
-  std::int64_t pixels = 0, known = 0;
+    : field_(field),
+      views_(views),
+      kernels_(kernels),
+      tiles_(PixelTiles::of(views, heldout, field.options.texture_share)),
+      earlier_rays_(static_cast<std::uint64_t>(field.history.rays)) {
+  std::int64_t known = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (heldout[i]) continue;
     training_.push_back(static_cast<int>(i));
-    pixels += static_cast<std::int64_t>(views[i].target.total());
+    pixels_ += static_cast<std::int64_t>(views[i].target.total());
     known += static_cast<std::int64_t>(views[i].known.size());
-    pixel_ends_.push_back(pixels);
     known_ends_.push_back(known);
   }
   shards_.resize(shard_count);
@@ -100,32 +104,40 @@ Trainer::Trainer(FieldState& field, std::vector<NormalisedView>& views,
         proposing() ? std::max(1, field_.options.samples_per_step / field_.options.fine_samples)
                     : 512;
   if (device::Engine* engine = device::current(); engine != nullptr && !proposing())
-    device_ = start_on(*engine, field, views, heldout);
+    device_ = start_on(*engine, field, views, heldout, tiles_.view());
+}
+
+/// Of those whose distance is known.
+DrawnPixel Trainer::known_pixel(std::uint64_t bits) const {
+  const auto pick =
+      static_cast<std::int64_t>(bits % static_cast<std::uint64_t>(known_ends_.back()));
+  const auto slot = static_cast<std::size_t>(
+      std::upper_bound(known_ends_.begin(), known_ends_.end(), pick) - known_ends_.begin());
+  const int index = training_[slot];
+  const NormalisedView& view = views_[static_cast<std::size_t>(index)];
+  const int pixel =
+      view.known[static_cast<std::size_t>(pick - (slot > 0 ? known_ends_[slot - 1] : 0))];
+  return {index, pixel % view.target.cols, pixel / view.target.cols};
 }
 
 void Trainer::draw(Block& block, int begin, int end, const device::StepPlan& plan,
                    double progress) {
   const float supervision = plan.supervision;
   // Sparse points are few: while they count, a quarter of the rays goes through them.
-  const bool sparse = points_are_sparse(known_ends_.back(), pixel_ends_.back());
+  const bool sparse = points_are_sparse(known_ends_.back(), pixels_);
   block.rays.clear();
   block.targets.clear();
   block.drawn.clear();
   for (int i = begin; i < end; ++i) {
+    const std::uint64_t ray = plan.first_ray + static_cast<unsigned>(i);
     for (int attempt = 0; attempt < draw_attempts; ++attempt) {
       const std::uint64_t key = draw_key(plan.step, i, attempt);
       const std::uint64_t bits = random_bits(plan.seed, pixel_stream, key);
       const bool at_known = sparse && supervision > 0 && i % known_every == 0;
-      const auto& ends = at_known ? known_ends_ : pixel_ends_;
-      const auto pick = static_cast<std::int64_t>(bits % static_cast<std::uint64_t>(ends.back()));
-      const auto slot =
-          static_cast<std::size_t>(std::upper_bound(ends.begin(), ends.end(), pick) - ends.begin());
-      const int index = training_[slot];
+      const auto [index, x, y] =
+          at_known ? known_pixel(bits)
+                   : pixel_at(tiles_.view(), pixel_bits(plan.seed, ray, attempt, bits));
       const NormalisedView& view = views_[static_cast<std::size_t>(index)];
-      std::int64_t pixel = pick - (slot > 0 ? ends[slot - 1] : 0);
-      if (at_known) pixel = view.known[static_cast<std::size_t>(pixel)];
-      const int x = static_cast<int>(pixel % view.target.cols),
-                y = static_cast<int>(pixel / view.target.cols);
       if (shows_nothing(view, x, y) && (bits >> 32) % background_every != 0) continue;
       RayTarget target;
       const float* stored = view.target.ptr<float>(y) + x * field_.channels();
@@ -143,7 +155,7 @@ void Trainer::draw(Block& block, int begin, int end, const device::StepPlan& pla
         target.depth_weight = supervision;
       }
       block.targets.push_back(target);
-      drawn.jitter = random_uniform(plan.seed, jitter_stream, key);
+      drawn.jitter = ray_jitter(plan.seed, ray);
       block.drawn.push_back(drawn);
       break;
     }
@@ -167,6 +179,7 @@ device::StepPlan Trainer::plan(double progress) const {
   device::StepPlan plan;
   plan.step = field_.step;
   plan.rays = field_.rays_per_step;
+  plan.first_ray = earlier_rays_ + static_cast<std::uint64_t>(rays_);
   plan.seed = o.seed;
   plan.supervision = static_cast<float>(depth_weight(o, progress));
   plan.posing = o.refine_poses && progress > poses_move_from && progress < poses_move_until;

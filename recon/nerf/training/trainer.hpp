@@ -11,6 +11,7 @@
 #include "recon/nerf/field/field_state.hpp"
 #include "recon/nerf/rendering/proposal.hpp"
 #include "recon/nerf/training/backward.hpp"
+#include "recon/nerf/training/pixel_tiles.hpp"
 #include "recon/nerf/training/pose_steps.hpp"
 #include "recon/nerf/training/scene.hpp"
 
@@ -46,6 +47,7 @@ class Trainer {
     std::vector<DrawnRay> drawn;
   };
 
+  DrawnPixel known_pixel(std::uint64_t bits) const;
   void draw(Block& block, int begin, int end, const device::StepPlan& plan, double progress);
   bool proposing() const { return field_.options.sampling == Sampling::proposal; }
   bool proposals_learn(double progress) const;
@@ -67,14 +69,16 @@ class Trainer {
   FieldState& field_;
   std::vector<NormalisedView>& views_;
   const Kernels& kernels_;
-  std::vector<int> training_;             ///< indices of the views that train
-  std::vector<std::int64_t> pixel_ends_;  ///< running pixel count over them
+  std::vector<int> training_;  ///< indices of the views that train
+  PixelTiles tiles_;
+  std::int64_t pixels_ = 0;               ///< of them
   std::vector<std::int64_t> known_ends_;  ///< running count of pixels with known distance
   std::vector<Block> blocks_;
   std::vector<BlockGradients> shards_;
   std::vector<std::vector<PoseSums>> pose_shards_;  ///< [shard][view] of one step (refine_poses)
   std::unique_ptr<device::Steps> device_;           ///< null: the processor
-  bool behind_ = false;  ///< field_ is: the device has made steps since the last settle()
+  bool behind_ = false;         ///< field_ is: the device has made steps since the last settle()
+  std::uint64_t earlier_rays_;  ///< of the run's parts before this one
   long rays_ = 0, samples_ = 0;
 };
 
