@@ -23,7 +23,8 @@ double kelvin_at(const std::string& body, int x, int y) {
   return count * part.at("scale").get<double>() + part.at("offset").get<double>();
 }
 
-// It lies beside a render of a field that is without its lens' shading, and measurements read it so.
+// It lies beside a render of a field that is without its lens' shading, and measurements read it
+// so.
 TEST(Photo, ThermalOneIsWithoutItsLensShading) {
   const orbitfuse::test::TempFolder folder;
   FinishedRun run;
