@@ -143,6 +143,8 @@ class StagedRun {
   const Missing missing_;
   const double start_s_ = wall_seconds();
   stages::SessionInput input_;
+  /// Stages are made again when a plan changes.
+  std::shared_ptr<nerf::KeptRenders> kept_ = std::make_shared<nerf::KeptRenders>();
   std::string session_;
   pipeline::RunOptions options_;
   std::unique_ptr<planning::RunPlanner> planner_;
@@ -284,7 +286,7 @@ Status StagedRun::plan(double budget_s) {
 void StagedRun::before_stage(pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
   const std::string warning = planner_->decide(stage.name, finished);
   if (!warning.empty()) context_.console.warning(warning);
-  for (pipeline::Stage& now : stages::build_stages(input_, context_.config))
+  for (pipeline::Stage& now : stages::build_stages(input_, context_.config, kept_))
     if (now.name == stage.name) stage = now;
   // The report tells of the plan. A disk that can't be written to stops the stage itself.
   if (!options_.dry_run) (void)planner_->save(finished);
@@ -322,7 +324,7 @@ void StagedRun::warn_of_overrun() const {
 }
 
 Status StagedRun::run(bool whole) {
-  pipeline::Runner runner(stages::build_stages(input_, context_.config), options_,
+  pipeline::Runner runner(stages::build_stages(input_, context_.config, kept_), options_,
                           context_.progress);
   runner.before_stage = [&](pipeline::Stage& stage, const std::vector<StageStatus>& finished) {
     if (planner_) return before_stage(stage, finished);

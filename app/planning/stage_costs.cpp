@@ -22,11 +22,11 @@ constexpr double visible_pose_s =
 constexpr double thermal_pose_s = 0.95;
 constexpr double depth_view_s = 0.62;  // of 400 x 300 pixels
 constexpr double visible_step = 2.85e-3, thermal_step = 3.5e-3;
-constexpr double visible_view_s = 0.12;  // its image, its exposure, its part of the cloud
-constexpr double thermal_view_s = 0.06;
+constexpr double visible_view_s = 0.19;  // its image, its exposure, its part of the cloud
+constexpr double thermal_view_s = 0.12;
 constexpr double visible_checks_s = 0.5, thermal_checks_s = 1.1;  // of held-out views
 constexpr double new_view_mpx_s = 3.0;                            // both fields
-constexpr double lent_view_s = 0.14;   // a recorded view that lends detail
+constexpr double lent_view_s = 0.06;  // a recorded view that lends detail; its cloud has the render
 constexpr double fused_mpx_s = 0.115;  // a method
 constexpr double scored_mpx_s = 0.34, heldout_view_s = 0.25;
 constexpr int heldout_every = 12;

@@ -5,9 +5,11 @@
 
 namespace orbitfuse::stages {
 
-std::vector<pipeline::Stage> build_stages(const SessionInput& session, const RunConfig& config) {
+std::vector<pipeline::Stage> build_stages(const SessionInput& session, const RunConfig& config,
+                                          std::shared_ptr<nerf::KeptRenders> kept) {
   const StageInputs in{std::make_shared<const SessionInput>(session),
-                       std::make_shared<RunConfig>(config)};
+                       std::make_shared<RunConfig>(config),
+                       kept ? std::move(kept) : std::make_shared<nerf::KeptRenders>()};
   return {
       poses_stage(in, Modality::visible),
       depth_stage(in),

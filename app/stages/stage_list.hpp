@@ -18,8 +18,9 @@ inline constexpr const char* cloud_file = "cloud.ply";  ///< absent when no poin
 struct StageInputs {
   std::shared_ptr<const SessionInput> session;
   std::shared_ptr<RunConfig> config;
-  /// Made once, for point clouds, new views and held-out ones.
-  std::shared_ptr<nerf::KeptRenders> where_frames_stand = std::make_shared<nerf::KeptRenders>();
+  /// Made once, for point clouds, new views and held-out ones; of both fields, whose frames have
+  /// names of their own.
+  std::shared_ptr<nerf::KeptRenders> where_frames_stand;
 };
 
 pipeline::Stage poses_stage(const StageInputs& in, Modality modality);

@@ -69,7 +69,6 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
           {"depth of the thermal views", *own_depth.problem, "the field learns from images alone"});
   }
   options.checkpoint = context.folder / "checkpoint.bin";
-  options.checkpoint_at_end = false;
   options.resume = true;  // where there is a checkpoint: of an interrupted attempt, or to extend
   if (!std::filesystem::exists(options.checkpoint)) {
     ORBITFUSE_ASSIGN(const int done, extend_training(context, resolved, options.checkpoint));

@@ -63,9 +63,11 @@ Status load_fields(const pipeline::StageContext& context, FinishedRun& run) {
 
 Status load_views(const pipeline::StageContext& context, FinishedRun& run) {
   if (run.has(Modality::thermal)) {
-    ORBITFUSE_ASSIGN(const stages::TrainedFrames trained,
-                     stages::load_trained_frames(context.of("train_thermal")));
-    run.shading_k = trained.shading_k;
+    if (const auto trained = stages::load_trained_frames(context.of("train_thermal")))
+      run.shading_k = trained->shading_k;
+    else
+      run.notes.push_back("photos are shown with the shading of their lens: " +
+                          trained.error().message());
   }
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const std::string stage = "poses_" + std::string(name(modality));

@@ -30,7 +30,8 @@ struct KeptRenders {
 inline const RenderOptions where_views_stand = {.alike = 0.01};
 
 /// The view as `field` shows it to `camera` (the view's own but for its size): kept, or rendered
-/// and kept. `kept` may be null; all calls for one object are for one field. Errors: as render().
+/// and kept in the place of an earlier one. `kept` may be null; views of one name are of one field.
+/// Errors: as render().
 Result<RenderedView> render_where_it_stands(const Field& field, const PosedView& view,
                                             const Camera& camera, KeptRenders* kept,
                                             const Progress& progress);

@@ -46,7 +46,6 @@ const std::vector<Entry>& table() {
       FIELD(seed, never),
       FIELD(checkpoint, free),
       FIELD(checkpoint_every_s, free, 0),
-      FIELD(checkpoint_at_end, free),
       FIELD(resume, free),
       FIELD(levels, never, 1, 16),
       FIELD(features_per_level, never, 2, 4),
@@ -224,7 +223,7 @@ Result<TrainOptions> preset(const std::string& name) {
     o.distortion_weight = 0.01;
     o.color_hidden = 32;
     o.sh_degree = 0;      // emitted heat hardly depends on the direction
-    o.texture_share = 0;  // what is hot is smooth, too: 7 % worse by texture (docs/notes/nerf.md)
+    o.texture_share = 0;  // on two of four scenes worse by texture (docs/notes/nerf.md)
     o.per_image_offset = true;
     o.refine_poses =
         true;  // thermal poses are a third of a degree off where visible ones are exact

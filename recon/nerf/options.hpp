@@ -34,8 +34,7 @@ struct TrainOptions {
   // -- determinism, checkpoints --------------------------------------------------------------
   std::uint64_t seed = 1;
   std::filesystem::path checkpoint;  ///< written atomically; empty = no checkpoints
-  double checkpoint_every_s = 60;    ///< also written on cancel
-  bool checkpoint_at_end = true;     ///< false: the caller saves the field at once
+  double checkpoint_every_s = 60;    ///< also written on cancel and at the end
   /// Go on from `checkpoint` if it exists. Options that free_to_change() may differ from those it
   /// was made with; more iterations or budget_s extend the run (nerf.hpp says how schedules go on).
   bool resume = false;

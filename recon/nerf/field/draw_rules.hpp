@@ -70,8 +70,8 @@ ORBITFUSE_HOST_DEVICE inline DrawnPixel pixel_at(const PixelTilesView& of, std::
 }
 
 /// What draws a ray's pixel: the first attempts of a run's rays, one after the other, lie evenly
-/// over all pixels, whichever stretch of them is looked at: a run of them learns as much as one of
-/// a quarter more rays at random (docs/notes/nerf.md).
+/// over all pixels, whichever stretch of them is looked at. Fields learn more from them than from
+/// as many at random (docs/notes/nerf.md).
 ORBITFUSE_HOST_DEVICE inline std::uint64_t pixel_bits(std::uint64_t seed, std::uint64_t ray,
                                                       int attempt, std::uint64_t random) {
   return attempt > 0 ? random : even_bits(random_bits(seed, even_stream, 0), golden_share, ray);

@@ -26,10 +26,14 @@ Result<RenderedView> render_where_it_stands(const Field& field, const PosedView&
       return known->second.seen;
   ORBITFUSE_ASSIGN(RenderedView seen,
                    render(field, camera, view.cam_from_world, where_views_stand, progress));
-  if (kept == nullptr || kept->bytes + bytes_of(seen) > kept->most_bytes) return seen;
-  if (kept->by_name.try_emplace(view.name, KeptRenders::Kept{camera, view.cam_from_world, seen})
-          .second)
-    kept->bytes += bytes_of(seen);
+  if (kept == nullptr) return seen;
+  if (const auto other = kept->by_name.find(view.name); other != kept->by_name.end()) {
+    kept->bytes -= bytes_of(other->second.seen);
+    kept->by_name.erase(other);
+  }
+  if (kept->bytes + bytes_of(seen) > kept->most_bytes) return seen;
+  kept->bytes += bytes_of(seen);
+  kept->by_name.emplace(view.name, KeptRenders::Kept{camera, view.cam_from_world, seen});
   return seen;
 }
 

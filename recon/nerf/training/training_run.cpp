@@ -343,7 +343,7 @@ Status TrainingRun::loop() {
     return fail(ErrorKind::usage, "nerf.budget_s",
                 fmt::format("{} s were over before the first step", options_.budget_s),
                 "allow more time");
-  return options_.checkpoint_at_end ? save() : Status();
+  return save();
 }
 
 Status TrainingRun::save_after_refusal() {
