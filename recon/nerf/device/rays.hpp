@@ -125,14 +125,7 @@ struct DrawRays {
   ORBITFUSE_HOST_DEVICE DrawnPixel known_pixel(std::uint64_t bits) const {
     const auto pick =
         static_cast<long long>(bits % static_cast<std::uint64_t>(known_ends[training_count - 1]));
-    int slot = 0, beyond = training_count;  // the first whose end lies behind the pick
-    while (slot < beyond) {
-      const int middle = (slot + beyond) / 2;
-      if (known_ends[middle] > pick)
-        beyond = middle;
-      else
-        slot = middle + 1;
-    }
+    const int slot = first_beyond(known_ends, training_count, pick);
     const TrainingPhoto& view = photos.view[training[slot]];
     const int pixel = photos.known[view.known + pick - (slot > 0 ? known_ends[slot - 1] : 0)];
     return {training[slot], pixel % view.rays.width, pixel / view.rays.width};

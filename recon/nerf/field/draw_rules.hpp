@@ -49,6 +49,19 @@ struct PixelTilesView {
 struct DrawnPixel {
   int view, x, y;
 };
+/// The first of the running sums `ends` that lies behind `pick`; std::upper_bound, on a device too.
+template <class Number>
+ORBITFUSE_HOST_DEVICE inline int first_beyond(const Number* ends, int count, Number pick) {
+  int low = 0, beyond = count;
+  while (low < beyond) {
+    const int middle = (low + beyond) / 2;
+    if (ends[middle] > pick)
+      beyond = middle;
+    else
+      low = middle + 1;
+  }
+  return low;
+}
 /// `draw` of [0, 2^64).
 ORBITFUSE_HOST_DEVICE inline DrawnPixel pixel_at(const PixelTilesView& of, std::uint64_t draw) {
   const std::uint64_t all = of.ends[of.count - 1];
@@ -56,16 +69,9 @@ ORBITFUSE_HOST_DEVICE inline DrawnPixel pixel_at(const PixelTilesView& of, std::
   auto pick = static_cast<std::uint64_t>(static_cast<double>(draw >> 11) * 0x1p-53 *
                                          static_cast<double>(all));
   if (pick >= all) pick = all - 1;
-  int low = 0, beyond = of.count;  // the first whose end lies behind the pick
-  while (low < beyond) {
-    const int middle = (low + beyond) / 2;
-    if (of.ends[middle] > pick)
-      beyond = middle;
-    else
-      low = middle + 1;
-  }
-  const PixelTile& tile = of.tiles[low];
-  const auto pixel = static_cast<int>((pick - (low > 0 ? of.ends[low - 1] : 0)) / tile.weight);
+  const int found = first_beyond(of.ends, of.count, pick);
+  const PixelTile& tile = of.tiles[found];
+  const auto pixel = static_cast<int>((pick - (found > 0 ? of.ends[found - 1] : 0)) / tile.weight);
   return {tile.view, tile.x + pixel % tile.columns, tile.y + pixel / tile.columns};
 }
 
