@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <functional>
+
 #include "app/stages/build_stages.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/transforms_json.hpp"
@@ -10,6 +12,7 @@
 #include "core/image/image_io.hpp"
 #include "core/nested_text.hpp"
 #include "core/system/file_io.hpp"
+#include "core/system/side_by_side.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse::stages {
@@ -24,6 +27,23 @@ fs::path depth_file(const fs::path& folder, const DepthMap& map, const char* kin
 
 constexpr const char* normal_kinds[] = {"normal_x", "normal_y", "normal_z"};
 constexpr const char* run_again = "run the stage that writes it again (--force)";
+
+Result<DepthMap> load_depth_map(const fs::path& folder, const JsonFields& entry) {
+  DepthMap map;
+  bool has_normal = false;
+  ORBITFUSE_TRY(entry.get_all("view", map.view, "normal", has_normal));
+  ORBITFUSE_ASSIGN(const JsonFields camera, entry.child("camera"));
+  ORBITFUSE_ASSIGN(map.camera, camera_of_json(camera));
+  ORBITFUSE_ASSIGN(map.depth, read_float_tiff(depth_file(folder, map, "depth")));
+  ORBITFUSE_ASSIGN(map.confidence, read_float_tiff(depth_file(folder, map, "confidence")));
+  if (!has_normal) return map;
+  cv::Mat axes[3];
+  for (int i = 0; i < 3; ++i) {
+    ORBITFUSE_ASSIGN(axes[i], read_float_tiff(depth_file(folder, map, normal_kinds[i])));
+  }
+  cv::merge(axes, 3, map.normal);
+  return map;
+}
 
 }  // namespace
 
@@ -152,17 +172,22 @@ Result<FusedImages> load_fused_images(const fs::path& folder) {
 
 Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps) {
   json list = json::array();
+  std::vector<std::function<Status()>> writes;
   for (const DepthMap& map : maps) {
-    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "depth"), map.depth));
-    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "confidence"), map.confidence));
-    std::vector<cv::Mat> axes;
-    if (!map.normal.empty()) cv::split(map.normal, axes);
-    for (std::size_t i = 0; i < axes.size(); ++i)
-      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
+    writes.emplace_back([&]() -> Status {
+      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "depth"), map.depth));
+      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "confidence"), map.confidence));
+      std::vector<cv::Mat> axes;
+      if (!map.normal.empty()) cv::split(map.normal, axes);
+      for (std::size_t i = 0; i < axes.size(); ++i)
+        ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
+      return {};
+    });
     list.push_back({{"view", map.view},
                     {"camera", pinhole_json(map.camera)},
                     {"normal", !map.normal.empty()}});
   }
+  ORBITFUSE_TRY(side_by_side(writes));
   return write_json(folder / "depth.json", list);
 }
 
@@ -172,24 +197,14 @@ Result<std::vector<DepthMap>> load_depth_maps(const fs::path& folder) {
   const json named = {{"maps", list}};
   ORBITFUSE_ASSIGN(const std::vector<JsonFields> entries,
                    stage_fields(named, file).children("maps"));
-  std::vector<DepthMap> maps;
-  for (const JsonFields& entry : entries) {
-    DepthMap map;
-    bool has_normal = false;
-    ORBITFUSE_TRY(entry.get_all("view", map.view, "normal", has_normal));
-    ORBITFUSE_ASSIGN(const JsonFields camera, entry.child("camera"));
-    ORBITFUSE_ASSIGN(map.camera, camera_of_json(camera));
-    ORBITFUSE_ASSIGN(map.depth, read_float_tiff(depth_file(folder, map, "depth")));
-    ORBITFUSE_ASSIGN(map.confidence, read_float_tiff(depth_file(folder, map, "confidence")));
-    if (has_normal) {
-      cv::Mat axes[3];
-      for (int i = 0; i < 3; ++i) {
-        ORBITFUSE_ASSIGN(axes[i], read_float_tiff(depth_file(folder, map, normal_kinds[i])));
-      }
-      cv::merge(axes, 3, map.normal);
-    }
-    maps.push_back(std::move(map));
-  }
+  std::vector<DepthMap> maps(entries.size());
+  std::vector<std::function<Status()>> reads;
+  for (std::size_t i = 0; i < entries.size(); ++i)
+    reads.emplace_back([&, i]() -> Status {
+      ORBITFUSE_ASSIGN(maps[i], load_depth_map(folder, entries[i]));
+      return {};
+    });
+  ORBITFUSE_TRY(side_by_side(reads));
   return maps;
 }
 

@@ -5,6 +5,7 @@
 #include "app/stages/stage_list.hpp"
 #include "app/stages/train_extension.hpp"
 #include "core/formats/ply.hpp"
+#include "core/system/side_by_side.hpp"
 #include "recon/assembly/thermal_depth.hpp"
 #include "recon/assembly/training_data.hpp"
 #include "recon/nerf/nerf.hpp"
@@ -83,17 +84,22 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   ORBITFUSE_ASSIGN(
       const nerf::TrainReport report,
       nerf::train(data, options, context.progress, field, guide.empty() ? nullptr : &guide));
-  ORBITFUSE_TRY(field.save(context.folder / field_file));
   ORBITFUSE_TRY(write_json(context.folder / "curve.json", curve_json(report)));
   ORBITFUSE_TRY(take_refined_poses(report, context, input.session, model));
-  auto cloud = nerf::export_point_cloud(field, model.views, config.cloud, context.progress, kept);
-  if (cloud) {
-    ORBITFUSE_TRY(write_ply(context.folder / cloud_file, *cloud));
-  } else if (cloud.error().kind == ErrorKind::quality) {
-    output.warnings.push_back("no point cloud: " + cloud.error().message());
-  } else {
-    return tl::unexpected(cloud.error());
-  }
+  std::size_t cloud_points = 0;
+  const auto export_cloud = [&]() -> Status {
+    const auto cloud =
+        nerf::export_point_cloud(field, model.views, config.cloud, context.progress, kept);
+    if (!cloud && cloud.error().kind == ErrorKind::quality) {
+      output.warnings.push_back("no point cloud: " + cloud.error().message());
+      return {};
+    }
+    if (!cloud) return tl::unexpected(cloud.error());
+    cloud_points = cloud->size();
+    return write_ply(context.folder / cloud_file, *cloud);
+  };
+  // The disk takes its time over a field.
+  ORBITFUSE_TRY(side_by_side({export_cloud, [&] { return field.save(context.folder / field_file); }}));
   std::error_code ignored;
   std::filesystem::remove(options.checkpoint, ignored);
 
@@ -105,7 +111,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   output.metrics = metrics_json(report);
   if (!report.device.empty()) output.metrics["device"] = report.device;
   if (own_depth.known > 0) output.metrics["own_depth_known"] = own_depth.known;
-  output.metrics["cloud_points"] = cloud ? cloud->size() : 0;
+  output.metrics["cloud_points"] = cloud_points;
   output.metrics["width_px"] = data.views.empty() ? 0 : data.views[0].camera.width;
   return output;
 }

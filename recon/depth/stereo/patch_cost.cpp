@@ -98,8 +98,10 @@ ReferencePatch reference_patch(const DepthView& view, int x, int y) {
   return patch;
 }
 
+bool is_flat(const ReferencePatch& patch) { return patch.variance < min_variance; }
+
 float patch_cost(const ReferencePatch& patch, const SourceView& s, const Eigen::Vector3f& plane) {
-  if (patch.variance < min_variance) return 1.0f;
+  if (is_flat(patch)) return 1.0f;
   // x_s ~ a x + b (plane . x): the homography acts on (x, y, 1).
   const Eigen::Matrix3f h = s.a + s.b * plane.transpose();
   const Eigen::Vector3f at = h * Eigen::Vector3f(patch.x, patch.y, 1.0f);

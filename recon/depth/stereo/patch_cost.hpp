@@ -26,6 +26,9 @@ struct ReferencePatch {
   float x = 0, y = 0;  ///< pixel centre
 };
 
+/// Of one colour: every plane costs the same.
+bool is_flat(const ReferencePatch& patch);
+
 /// From the reference camera to one source camera.
 struct SourceView {
   const std::uint8_t* pixels = nullptr;

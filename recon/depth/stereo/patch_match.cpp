@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <numeric>
 
 #include "core/numeric/random.hpp"
 
@@ -52,31 +54,60 @@ float depth_on(const Plane& plane, const Eigen::Vector3f& own_ray, const Eigen::
   return bottom < 0 && depth > 0 ? depth : std::numeric_limits<float>::quiet_NaN();
 }
 
+constexpr std::size_t most_sources = 16;
+/// Those that show a pixel's plane, best first.
+using Sources = std::array<std::uint8_t, most_sources>;
+
+/// A pixel of a lower cost is sure which sources show it: another plane has to do better in those,
+/// before all are asked. A quarter of the work less, as many pixels confirmed (docs/notes/depth.md).
+constexpr float sure_cost = 0.2f;
+
+/// Planes that no later stage tells apart: depths must agree within 1.2 % (DepthOptions).
+bool alike(const Plane& a, const Plane& b) {
+  constexpr float same_depth = 1e-3f, same_cosine = 0.999f;
+  return std::abs(a.depth - b.depth) <= same_depth * b.depth &&
+         a.normal.dot(b.normal) >= same_cosine;
+}
+
 struct Match {
   const DepthView& view;
   const std::vector<SourceView>& sources;
   int best;  ///< sources that count
   float ifx, ify, icx, icy;
 
-  /// Mean of the best sources' costs: a surface is not seen by all.
-  float cost(const ReferencePatch& patch, const Plane& plane, const Eigen::Vector3f& ray) const {
+  /// Mean of the best sources' costs: a surface is not seen by all. Below the worst, `limit` is what
+  /// those that `shown_by` names first must reach before the others are asked: if they don't, the
+  /// answer is the worst. `shown_by` becomes the sources in their order.
+  float cost(const ReferencePatch& patch, const Plane& plane, const Eigen::Vector3f& ray,
+             float limit, Sources& shown_by) const {
     // n . X over the plane is constant: depth * n . ray. In pixels: K^-T n / that.
     const float scale = 1.0f / (plane.depth * plane.normal.dot(ray));
     const Eigen::Vector3f n = plane.normal * scale;
     const Eigen::Vector3f pixels(n.x() * ifx, n.y() * ify, n.z() - n.x() * icx - n.y() * icy);
-    std::array<float, 16> costs;
-    const int count = static_cast<int>(sources.size());
-    for (int i = 0; i < count; ++i) {
-      float c = patch_cost(patch, sources[static_cast<std::size_t>(i)], pixels);
-      int at = i;  // insertion sort
-      for (; at > 0 && costs[static_cast<std::size_t>(at - 1)] > c; --at)
-        costs[static_cast<std::size_t>(at)] = costs[static_cast<std::size_t>(at - 1)];
-      costs[static_cast<std::size_t>(at)] = c;
-    }
-    const int used = std::min(best, count);
+    const std::size_t count = sources.size(),
+                      used = std::min(static_cast<std::size_t>(best), count);
+    std::array<float, most_sources> costs;
+    Sources order{};
+    std::size_t known = 0;
+    std::uint32_t asked = 0;
+    const auto ask = [&](std::uint8_t source) {
+      const float c = patch_cost(patch, sources[source], pixels);
+      std::size_t at = known++;  // insertion sort
+      for (; at > 0 && costs[at - 1] > c; --at)
+        costs[at] = costs[at - 1], order[at] = order[at - 1];
+      costs[at] = c, order[at] = source;
+      asked |= 1u << source;
+      return c;
+    };
     float sum = 0;
-    for (int i = 0; i < used; ++i) sum += costs[static_cast<std::size_t>(i)];
-    return sum / static_cast<float>(used);
+    for (std::size_t i = 0; limit < worst_cost && i < used; ++i) {
+      sum += ask(shown_by[i]);
+      if (sum > limit * static_cast<float>(used)) return worst_cost;
+    }
+    for (std::uint8_t i = 0; i < count; ++i)
+      if ((asked >> i & 1u) == 0) ask(i);
+    shown_by = order;
+    return std::accumulate(costs.begin(), costs.begin() + used, 0.0f) / static_cast<float>(used);
   }
 };
 
@@ -162,6 +193,7 @@ void improve(PlaneMap& map, const DepthView& view, const std::vector<SourceView>
   // All neighbours are of the other colour. A plane that was offered before is no better now: only
   // those that changed since this pixel's last turn are looked at, a third of the work less.
   std::vector<int> changed(map.plane.size(), 0);
+  std::vector<Sources> shown_by(map.plane.size());
   for (int iteration = 0; iteration <= iterations; ++iteration) {
     // Round 0 only prices what is there; changes shrink by half each round.
     const float width = std::ldexp(0.5f, -iteration);
@@ -175,14 +207,18 @@ void improve(PlaneMap& map, const DepthView& view, const std::vector<SourceView>
           const ReferencePatch patch = reference_patch(view, x, y);
           Plane best = map.plane[here];
           if (iteration == 0) {
-            map.cost[here] = match.cost(patch, best, ray);
+            map.cost[here] = match.cost(patch, best, ray, worst_cost, shown_by[here]);
             continue;
           }
+          if (is_flat(patch)) continue;  // no plane is better than another
           float best_cost = map.cost[here];
           const auto offer = [&](const Plane& plane) {
             if (!(plane.depth >= range.near && plane.depth <= range.far)) return;
-            const float cost = match.cost(patch, plane, ray);
+            Sources by = shown_by[here];
+            const float limit = best_cost < sure_cost ? best_cost : worst_cost;
+            const float cost = match.cost(patch, plane, ray, limit, by);
             if (cost < best_cost) {
+              shown_by[here] = by;
               best_cost = cost;
               best = plane;
               changed[here] = turn;
@@ -196,7 +232,7 @@ void improve(PlaneMap& map, const DepthView& view, const std::vector<SourceView>
             Plane plane = map.plane[there];
             plane.depth = depth_on(plane, rays[there], ray);
             plane.normal = facing(plane.normal, ray);
-            offer(plane);
+            if (!alike(plane, best)) offer(plane);
           }
           Random random(seed + static_cast<std::uint64_t>(iteration) * 1000003u, here);
           Plane change = best;

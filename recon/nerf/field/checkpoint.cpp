@@ -9,6 +9,7 @@
 
 #include "core/system/file_io.hpp"
 #include "core/system/parallel.hpp"
+#include "core/system/trace.hpp"
 #include "recon/nerf/nerf.hpp"
 
 // Layout: magic, version, then tagless values in the order of `visit`, then the hash of all bytes
@@ -284,6 +285,7 @@ void visit(Archive& io, FieldState& state) {
 }  // namespace
 
 Status save_state(const FieldState& state, const std::filesystem::path& path) {
+  const TraceSpan span("write a field");
   Writer writer;
   visit(writer, const_cast<FieldState&>(state));  // the writing archive only reads
   const std::string hash = content_hash(writer.bytes);
@@ -292,6 +294,7 @@ Status save_state(const FieldState& state, const std::filesystem::path& path) {
 }
 
 Result<FieldState> load_state(const std::filesystem::path& path) {
+  const TraceSpan span("read a field");
   ORBITFUSE_ASSIGN(const std::string bytes, read_file(path));
   const auto bad = [&](std::string found) {
     return fail(ErrorKind::input, path.string(), std::move(found),

@@ -167,6 +167,9 @@ void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
       _mm256_store_ps(turn.size, size);
       const __m256i index = _mm256_or_si256(_mm256_slli_epi32(block, 6), cell);
       store(turn.cell, _mm256_blendv_epi8(_mm256_set1_epi32(-1), index, matter));
+      for (const std::int32_t there : turn.cell)  // look_up_cells asks for them next
+        _mm_prefetch(reinterpret_cast<const char*>(grid.look.data() + std::max(there, 0)),
+                     _MM_HINT_T0);
     }
     t = _mm256_add_ps(t, _mm256_and_ps(exit, live));
   }

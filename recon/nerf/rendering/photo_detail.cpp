@@ -320,11 +320,14 @@ Result<DetailTrial> PhotoDetail::try_on(const Field& field, const std::vector<st
     ORBITFUSE_ASSIGN(cv::Mat recorded, image_of(source.recorded));
     // Finer than the base: what only the sources show is tried too.
     const Camera base = base_of(source.recorded);
-    const Camera camera = view.camera.width > 2 * base.width
-                              ? base.scaled_to(2 * base.width, 2 * base.height)
-                              : view.camera;
+    Camera camera = view.camera.width > 2 * base.width
+                        ? base.scaled_to(2 * base.width, 2 * base.height)
+                        : view.camera;
     if (recorded.cols != camera.width)
       cv::resize(recorded, recorded, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+    const int above = camera.height / 4;
+    camera.height -= 2 * above, camera.cy -= above;
+    recorded = recorded.rowRange(above, above + camera.height);
     ORBITFUSE_ASSIGN(RenderedView seen, render(field, camera, view.cam_from_world, {}, progress));
     const cv::Mat before = seen.color.clone();
     ORBITFUSE_TRY(add(field, camera, view.cam_from_world, seen, progress, view.name));
