@@ -20,7 +20,7 @@ constexpr double visible_pose_s =
 /// A view: search, renders, temperatures. 0.8 to 1.05 by scene; what is wrong is made good later,
 /// by the thermal training and the scores.
 constexpr double thermal_pose_s = 0.95;
-constexpr double depth_view_s = 0.62;  // of 400 x 300 pixels
+constexpr double depth_view_s = 0.41;  // of 400 x 300 pixels
 constexpr double visible_step = 2.85e-3, thermal_step = 3.5e-3;
 constexpr double visible_view_s = 0.19;  // its image, its exposure, its part of the cloud
 constexpr double thermal_view_s = 0.12;

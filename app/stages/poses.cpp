@@ -144,7 +144,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   stage.name = "poses_" + std::string(name(modality));
   stage.version = 16;  // transforms.json names files as seen from it
   if (!visible) {
-    stage.version = 20;
+    stage.version = 21;  // views on probation
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session))

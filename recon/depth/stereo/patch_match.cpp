@@ -59,7 +59,7 @@ constexpr std::size_t most_sources = 16;
 using Sources = std::array<std::uint8_t, most_sources>;
 
 /// A pixel of a lower cost is sure which sources show it: another plane has to do better in those,
-/// before all are asked. A quarter of the work less, as many pixels confirmed (docs/notes/depth.md).
+/// before all are asked. A quarter of the work less, as many pixels confirmed (docs/notes/nerf.md).
 constexpr float sure_cost = 0.2f;
 
 /// Planes that no later stage tells apart: depths must agree within 1.2 % (DepthOptions).

@@ -64,14 +64,18 @@ ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness) {
   // patches of other thermal views will tell.
   const bool left_to_patches =
       likeness >= like_correlation_share || (!agree && apart_deg < close_deg);
-  const Confidence confidence = left_to_patches ? Confidence::doubtful : Confidence::dropped;
+  const bool on_probation = !left_to_patches && likeness >= probation_correlation_share;
+  const Confidence confidence =
+      left_to_patches || on_probation ? Confidence::doubtful : Confidence::dropped;
   if (agree)
     return {confidence, DoubtReason::not_found,
-            "neither the visible scene nor the other views' temperatures show its edges"};
+            "neither the visible scene nor the other views' temperatures show its edges",
+            on_probation};
   return {confidence, DoubtReason::temperatures_elsewhere,
           fmt::format("the visible scene and the other views' temperatures place it {:.1f} deg "
                       "apart",
-                      apart_deg)};
+                      apart_deg),
+          on_probation};
 }
 
 double share_of_median(double support, double median) {

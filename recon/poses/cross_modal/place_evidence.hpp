@@ -16,6 +16,10 @@ inline constexpr double settled_support_share = 0.6;
 /// from there, though few of its edges say so. Gables of a hut, seen from low down, had .98 to 1.01
 /// of it.
 inline constexpr double like_correlation_share = 0.95;
+/// The same, of a view that goes into the bundle on probation: its neighbours' patches can draw it
+/// to its place, where it must look as much like them as that. Wrong views of `sedan` had up to
+/// .60, right ones .84 and more.
+inline constexpr double probation_correlation_share = 0.75;
 
 /// A view that the others' temperatures contradict, from where they place it best. Supports are
 /// shares of its loop's median one in the same scene.
@@ -38,7 +42,7 @@ ViewVerdict verdict_of_move(MoveDecision decision, const PlaceEvidence& seen, do
                             bool elsewhere);
 
 /// Of a view that nobody places: doubtful where patches of other thermal views can still tell (they
-/// make it sure, judged()), else dropped. `likeness`: its image's correlation with what the others
+/// make it sure, judged()), on probation where it may look right yet, else dropped. `likeness`: its image's correlation with what the others
 /// measured at the better of its two places, of the median view's.
 ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness);
 

@@ -187,8 +187,8 @@ Status leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& pa
                    "where it was, {:.2f} where temperatures have it",
                    view.view.name, like_here, like_there)});
   view.verdict = verdict_of_unplaced(agree, apart, std::max(like_here, like_there));
-  if (view.verdict.confidence == Confidence::doubtful && like_there > like_here &&
-      like_there >= like_correlation_share)
+  const bool like_enough = view.verdict.on_probation || like_there >= like_correlation_share;
+  if (view.verdict.confidence == Confidence::doubtful && like_enough && like_there > like_here)
     view.view = by_temperatures;
   return {};
 }

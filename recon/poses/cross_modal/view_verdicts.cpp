@@ -12,6 +12,7 @@
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
 #include "recon/poses/cross_modal/painted_scene.hpp"
+#include "recon/poses/cross_modal/place_evidence.hpp"
 #include "recon/poses/cross_modal/temperature_consistency.hpp"
 #include "recon/poses/world_frame.hpp"
 
@@ -172,6 +173,12 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
 
 ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
   if (before.confidence == Confidence::dropped) return before;
+  if (before.on_probation) {
+    const bool found = seen.correlation.value_or(0) > 0 &&
+                       *seen.correlation >= like_correlation_share * seen.median_correlation;
+    return found ? judged(seen, {Confidence::doubtful, before.reason, before.detail})
+                 : ViewVerdict{Confidence::dropped, before.reason, before.detail};
+  }
   const auto doubtful = [](DoubtReason reason, std::string detail) {
     return ViewVerdict{Confidence::doubtful, reason, std::move(detail)};
   };

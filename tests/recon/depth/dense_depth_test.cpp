@@ -91,6 +91,17 @@ TEST(DenseDepth, ConstantImagesHaveNoDepth) {
   EXPECT_EQ(found->report.known, 0);
 }
 
+TEST(DenseDepth, FlatPartsKeepTheirPlanesAndTheOthersFindTheirs) {
+  World world = arc(5, 15);
+  for (cv::Mat& image : world.images) image.colRange(0, image.cols / 3).setTo(100);
+  const auto found = dense_depth(world.model, world.images, quick(), {});
+  ASSERT_TRUE(found) << found.error().message();
+  const Quality q = quality(world, *found);
+  EXPECT_GT(q.known, 0.3);
+  EXPECT_LT(q.known, 0.75);  // nothing is known of what shows nothing
+  EXPECT_GT(q.good, 0.95);
+}
+
 TEST(DenseDepth, NoParallaxIsAQualityErrorAndBadInputNamesTheView) {
   World one = arc(1, 15);
   auto found = dense_depth(one.model, one.images, quick(), {});

@@ -177,9 +177,13 @@ TEST(CorrectByTemperatures, WhatNobodyPlacesIsLeftToPatchesOnlyWhereItLooksRight
     return verdict_of_unplaced(agree, apart_deg, likeness).confidence;
   };
   EXPECT_EQ(confidence(true, 0.1, 0.98), Confidence::doubtful);
-  EXPECT_EQ(confidence(true, 0.1, 0.90), Confidence::dropped);
+  EXPECT_FALSE(verdict_of_unplaced(true, 0.1, 0.98).on_probation);
+  EXPECT_EQ(confidence(true, 0.1, 0.90), Confidence::doubtful);
+  EXPECT_TRUE(verdict_of_unplaced(true, 0.1, 0.90).on_probation);
+  EXPECT_TRUE(verdict_of_unplaced(false, 2.7, 0.90).on_probation);
+  EXPECT_EQ(confidence(true, 0.1, 0.60), Confidence::dropped);
   EXPECT_EQ(confidence(false, 2.7, 0.98), Confidence::doubtful);
-  EXPECT_EQ(confidence(false, 2.7, 0.90), Confidence::dropped);
+  EXPECT_EQ(confidence(false, 2.7, 0.60), Confidence::dropped);
   EXPECT_EQ(confidence(false, 1.1, 0.20), Confidence::doubtful) << "not two places";
   EXPECT_EQ(confidence(false, 2.7, std::numeric_limits<double>::quiet_NaN()), Confidence::dropped);
   EXPECT_EQ(verdict_of_unplaced(true, 0.1, 0).reason, DoubtReason::not_found);

@@ -103,6 +103,27 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_EQ(judged(good, dropped).confidence, Confidence::dropped);
 }
 
+TEST(ViewVerdicts, AViewOnProbationStaysOnlyWhereItsImageIsWhatTheOthersMeasured) {
+  const ViewVerdict probation{Confidence::doubtful, DoubtReason::not_found, "nowhere", true};
+  ViewEvidence seen = good;
+  seen.median_correlation = 0.96, seen.correlation = 0.93;
+  const ViewVerdict kept = judged(seen, probation);
+  EXPECT_EQ(kept.confidence, Confidence::doubtful);
+  EXPECT_FALSE(kept.on_probation);
+  seen.confirmed_share = 0.5;
+  EXPECT_TRUE(judged(seen, probation).sure()) << "patches say so";
+  // A right view of `car`, which the visible scene hardly knew: kept, in doubt.
+  seen.support_share = 0.11, seen.confirmed_share = 0.34;
+  EXPECT_EQ(judged(seen, probation).confidence, Confidence::doubtful);
+  for (const std::optional<double> unlike :
+       {std::optional(0.88), std::optional<double>(),
+        std::optional(std::numeric_limits<double>::quiet_NaN())}) {
+    seen.correlation = unlike;
+    EXPECT_EQ(judged(seen, probation).confidence, Confidence::dropped);
+    EXPECT_EQ(judged(seen, probation).reason, DoubtReason::not_found);
+  }
+}
+
 TEST(ViewVerdicts, ALoopThatIsMostlyInDoubtIsSoAsAWhole) {
   OrbitViews orbit;
   Fit alignment;
