@@ -42,8 +42,9 @@ ViewVerdict verdict_of_move(MoveDecision decision, const PlaceEvidence& seen, do
                             bool elsewhere);
 
 /// Of a view that nobody places: doubtful where patches of other thermal views can still tell (they
-/// make it sure, judged()), on probation where it may look right yet, else dropped. `likeness`: its image's correlation with what the others
-/// measured at the better of its two places, of the median view's.
+/// make it sure, judged()), on probation where it may look right yet, else dropped. `likeness`: its
+/// image's correlation with what the others measured at the better of its two places, of the median
+/// view's.
 ViewVerdict verdict_of_unplaced(bool agree, double apart_deg, double likeness);
 
 /// Of its loop's median support; 0 where the loop has none: shares of nothing say nothing.
