@@ -59,8 +59,8 @@ struct ViewVerdict {
   Confidence confidence = Confidence::sure;
   DoubtReason reason = DoubtReason::none;
   std::string detail = {};  ///< figures, in words
-  /// Doubtful for the time being: dropped in the end unless bundling brings it to where its image is
-  /// what the other views measured.
+  /// Doubtful for the time being: dropped in the end unless bundling brings it to where its image
+  /// and its patches are what the other views show.
   bool on_probation = false;
 
   bool sure() const { return confidence == Confidence::sure; }

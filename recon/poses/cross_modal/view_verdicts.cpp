@@ -40,6 +40,9 @@ constexpr double settling_share = 0.9, settling_support_share = 0.5;
 /// nearly all: frames 3 degrees off had up to 0.89.
 constexpr double confirming_share = 0.4;
 constexpr double least_median_patches = 30;
+/// What keeps a view on probation, in doubt: the right place of one of `car` had 0.34, places of
+/// one of `sedan` 3 degrees off 0 and 0.05, the former with 0.97 of the usual correlation.
+constexpr double probation_patches_share = 0.25;
 /// Below it nobody confirms a view: form knows nothing of it.
 constexpr double least_support_share = 0.1;
 /// Stations are good to several degrees (sigma 2 to 3), loops to two in elevation. Where an
@@ -174,7 +177,8 @@ Result<std::vector<ViewEvidence>> evidence_of(const OrbitRefinement& refinement,
 ViewVerdict judged(const ViewEvidence& seen, const ViewVerdict& before) {
   if (before.confidence == Confidence::dropped) return before;
   if (before.on_probation) {
-    const bool found = seen.correlation.value_or(0) > 0 &&
+    const bool found = seen.confirmed_share >= probation_patches_share &&
+                       seen.correlation.value_or(0) > 0 &&
                        *seen.correlation >= like_correlation_share * seen.median_correlation;
     return found ? judged(seen, {Confidence::doubtful, before.reason, before.detail})
                  : ViewVerdict{Confidence::dropped, before.reason, before.detail};

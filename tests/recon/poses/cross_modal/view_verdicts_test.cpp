@@ -103,10 +103,12 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_EQ(judged(good, dropped).confidence, Confidence::dropped);
 }
 
-TEST(ViewVerdicts, AViewOnProbationStaysOnlyWhereItsImageIsWhatTheOthersMeasured) {
+TEST(ViewVerdicts, AViewOnProbationStaysOnlyWhereItsImageAndPatchesAreTheOthers) {
   const ViewVerdict probation{Confidence::doubtful, DoubtReason::not_found, "nowhere", true};
   ViewEvidence seen = good;
   seen.median_correlation = 0.96, seen.correlation = 0.93;
+  EXPECT_EQ(judged(seen, probation).confidence, Confidence::dropped) << "no patch confirms it";
+  seen.confirmed_share = 0.3;
   const ViewVerdict kept = judged(seen, probation);
   EXPECT_EQ(kept.confidence, Confidence::doubtful);
   EXPECT_FALSE(kept.on_probation);
