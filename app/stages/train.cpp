@@ -99,7 +99,8 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
     return write_ply(context.folder / cloud_file, *cloud);
   };
   // The disk takes its time over a field.
-  ORBITFUSE_TRY(side_by_side({export_cloud, [&] { return field.save(context.folder / field_file); }}));
+  ORBITFUSE_TRY(
+      side_by_side({export_cloud, [&] { return field.save(context.folder / field_file); }}));
   std::error_code ignored;
   std::filesystem::remove(options.checkpoint, ignored);
 

@@ -85,9 +85,9 @@ class PhotoDetail {
                      RenderedView& seen, const Progress& progress, const std::string& except = {});
 
   /// Whether detail helps: the middle half of views called `names` (where the object is), rendered
-  /// without and with the others' detail, at twice the base width. Where depth is wrong it lands in the wrong places. Meant for views that
-  /// the field never saw; those it learned from look better without than new ones do. Names that
-  /// aren't sources' are passed over. Errors: as add().
+  /// without and with the others' detail, at twice the base width. Where depth is wrong it lands in
+  /// the wrong places. Meant for views that the field never saw; those it learned from look better
+  /// without than new ones do. Names that aren't sources' are passed over. Errors: as add().
   Result<DetailTrial> try_on(const Field& field, const std::vector<std::string>& names,
                              const Progress& progress);
 

@@ -75,9 +75,9 @@ struct Match {
   int best;  ///< sources that count
   float ifx, ify, icx, icy;
 
-  /// Mean of the best sources' costs: a surface is not seen by all. Below the worst, `limit` is what
-  /// those that `shown_by` names first must reach before the others are asked: if they don't, the
-  /// answer is the worst. `shown_by` becomes the sources in their order.
+  /// Mean of the best sources' costs: a surface is not seen by all. Below the worst, `limit` is
+  /// what those that `shown_by` names first must reach before the others are asked: if they don't,
+  /// the answer is the worst. `shown_by` becomes the sources in their order.
   float cost(const ReferencePatch& patch, const Plane& plane, const Eigen::Vector3f& ray,
              float limit, Sources& shown_by) const {
     // n . X over the plane is constant: depth * n . ray. In pixels: K^-T n / that.
