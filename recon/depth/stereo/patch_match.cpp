@@ -63,7 +63,7 @@ using Sources = std::array<std::uint8_t, most_sources>;
 constexpr float sure_cost = 0.2f;
 
 /// Planes that no later stage tells apart: depths must agree within 1.2 % (DepthOptions).
-bool alike(const Plane& a, const Plane& b) {
+bool same_plane(const Plane& a, const Plane& b) {
   constexpr float same_depth = 1e-3f, same_cosine = 0.999f;
   return std::abs(a.depth - b.depth) <= same_depth * b.depth &&
          a.normal.dot(b.normal) >= same_cosine;
@@ -232,7 +232,7 @@ void improve(PlaneMap& map, const DepthView& view, const std::vector<SourceView>
             Plane plane = map.plane[there];
             plane.depth = depth_on(plane, rays[there], ray);
             plane.normal = facing(plane.normal, ray);
-            if (!alike(plane, best)) offer(plane);
+            if (!same_plane(plane, best)) offer(plane);
           }
           Random random(seed + static_cast<std::uint64_t>(iteration) * 1000003u, here);
           Plane change = best;
