@@ -172,22 +172,18 @@ Result<FusedImages> load_fused_images(const fs::path& folder) {
 
 Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps) {
   json list = json::array();
-  std::vector<std::function<Status()>> writes;
+  // One after the other: on a full disk several at once would leave no room to say so.
   for (const DepthMap& map : maps) {
-    writes.emplace_back([&]() -> Status {
-      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "depth"), map.depth));
-      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "confidence"), map.confidence));
-      std::vector<cv::Mat> axes;
-      if (!map.normal.empty()) cv::split(map.normal, axes);
-      for (std::size_t i = 0; i < axes.size(); ++i)
-        ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
-      return {};
-    });
+    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "depth"), map.depth));
+    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "confidence"), map.confidence));
+    std::vector<cv::Mat> axes;
+    if (!map.normal.empty()) cv::split(map.normal, axes);
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
     list.push_back({{"view", map.view},
                     {"camera", pinhole_json(map.camera)},
                     {"normal", !map.normal.empty()}});
   }
-  ORBITFUSE_TRY(side_by_side(writes));
   return write_json(folder / "depth.json", list);
 }
 
