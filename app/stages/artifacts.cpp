@@ -25,8 +25,19 @@ fs::path depth_file(const fs::path& folder, const DepthMap& map, const char* kin
   return folder / fmt::format("{:03}_{}.tiff", map.view, kind);
 }
 
-constexpr const char* normal_kinds[] = {"normal_x", "normal_y", "normal_z"};
+constexpr const char* depth_kinds[] = {"depth", "confidence", "normal_x", "normal_y", "normal_z"};
+constexpr const char* const* normal_kinds = depth_kinds + 2;
 constexpr const char* run_again = "run the stage that writes it again (--force)";
+
+Status save_depth_map(const fs::path& folder, const DepthMap& map) {
+  ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "depth"), map.depth));
+  ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "confidence"), map.confidence));
+  std::vector<cv::Mat> axes;
+  if (!map.normal.empty()) cv::split(map.normal, axes);
+  for (std::size_t i = 0; i < axes.size(); ++i)
+    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
+  return {};
+}
 
 Result<DepthMap> load_depth_map(const fs::path& folder, const JsonFields& entry) {
   DepthMap map;
@@ -172,17 +183,19 @@ Result<FusedImages> load_fused_images(const fs::path& folder) {
 
 Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps) {
   json list = json::array();
-  // One after the other: on a full disk several at once would leave no room to say so.
+  std::vector<std::function<Status()>> writes;
   for (const DepthMap& map : maps) {
-    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "depth"), map.depth));
-    ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, "confidence"), map.confidence));
-    std::vector<cv::Mat> axes;
-    if (!map.normal.empty()) cv::split(map.normal, axes);
-    for (std::size_t i = 0; i < axes.size(); ++i)
-      ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
+    writes.emplace_back([&] { return save_depth_map(folder, map); });
     list.push_back({{"view", map.view},
                     {"camera", pinhole_json(map.camera)},
                     {"normal", !map.normal.empty()}});
+  }
+  if (Status written = side_by_side(writes); !written) {
+    // Useless without the others, and a full disk needs room for what says so.
+    std::error_code ignored;
+    for (const DepthMap& map : maps)
+      for (const char* kind : depth_kinds) fs::remove(depth_file(folder, map, kind), ignored);
+    return written;
   }
   return write_json(folder / "depth.json", list);
 }
