@@ -269,7 +269,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 5;  // palettes hatch what was not measured; gray levels end at 255
+  stage.version = 6;  // detail is tried on the middle half of recorded views
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   stage.options["cameras"] = in.config->render.cameras;
