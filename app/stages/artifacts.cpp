@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <functional>
 
 #include "app/stages/build_stages.hpp"
@@ -25,8 +26,7 @@ fs::path depth_file(const fs::path& folder, const DepthMap& map, const char* kin
   return folder / fmt::format("{:03}_{}.tiff", map.view, kind);
 }
 
-constexpr const char* depth_kinds[] = {"depth", "confidence", "normal_x", "normal_y", "normal_z"};
-constexpr const char* const* normal_kinds = depth_kinds + 2;
+constexpr std::array normal_kinds = {"normal_x", "normal_y", "normal_z"};
 constexpr const char* run_again = "run the stage that writes it again (--force)";
 
 Status save_depth_map(const fs::path& folder, const DepthMap& map) {
@@ -37,6 +37,13 @@ Status save_depth_map(const fs::path& folder, const DepthMap& map) {
   for (std::size_t i = 0; i < axes.size(); ++i)
     ORBITFUSE_TRY(write_float_tiff(depth_file(folder, map, normal_kinds[i]), axes[i]));
   return {};
+}
+
+void remove_depth_map(const fs::path& folder, const DepthMap& map) {
+  std::error_code ignored;
+  for (const char* kind :
+       {"depth", "confidence", normal_kinds[0], normal_kinds[1], normal_kinds[2]})
+    fs::remove(depth_file(folder, map, kind), ignored);
 }
 
 Result<DepthMap> load_depth_map(const fs::path& folder, const JsonFields& entry) {
@@ -190,14 +197,12 @@ Status save_depth_maps(const fs::path& folder, const std::vector<DepthMap>& maps
                     {"camera", pinhole_json(map.camera)},
                     {"normal", !map.normal.empty()}});
   }
-  if (Status written = side_by_side(writes); !written) {
-    // Useless without the others, and a full disk needs room for what says so.
-    std::error_code ignored;
-    for (const DepthMap& map : maps)
-      for (const char* kind : depth_kinds) fs::remove(depth_file(folder, map, kind), ignored);
-    return written;
-  }
-  return write_json(folder / "depth.json", list);
+  Status written = side_by_side(writes);
+  if (written) written = write_json(folder / "depth.json", list);
+  // Useless without the others, and a full disk needs room for what says so.
+  if (!written)
+    for (const DepthMap& map : maps) remove_depth_map(folder, map);
+  return written;
 }
 
 Result<std::vector<DepthMap>> load_depth_maps(const fs::path& folder) {

@@ -124,7 +124,9 @@ Result<SessionInput> open_session_input(const fs::path& folder, const Progress& 
   ORBITFUSE_ASSIGN(input.session, open_session(folder));
   const Session& session = input.session;
   if (session.frames.empty())
-    return fail(ErrorKind::input, folder.string(), "the session has no frames",
+    return fail(ErrorKind::input, folder.string(),
+                fmt::format("the session has no frames{}{}", session.warnings.empty() ? "" : ": ",
+                            fmt::join(session.warnings, "; ")),
                 "record or import some first");
 
   std::vector<std::string> hashes;

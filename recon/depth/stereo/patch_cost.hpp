@@ -26,7 +26,7 @@ struct ReferencePatch {
   float x = 0, y = 0;  ///< pixel centre
 };
 
-/// Of one colour: every plane costs the same.
+/// Of nearly one brightness (noise apart): every plane costs the same.
 bool is_flat(const ReferencePatch& patch);
 
 /// From the reference camera to one source camera.

@@ -69,7 +69,8 @@ Status pose_tracking(const Session& session, const OrbitWork& work, const Camera
                      OrbitViews& orbit, RenderAlignment& rendered, const Progress& progress) {
   std::vector<PassedStation> passed;
   for (std::size_t i = 0; i < work.frames.size(); ++i) {
-    if (rendered.views[i].verdict.confidence == Confidence::dropped) continue;
+    const ViewVerdict& verdict = rendered.views[i].verdict;
+    if (verdict.confidence == Confidence::dropped || verdict.on_probation) continue;
     const Rigid3d cam = rebase(rendered.views[i].view.cam_from_world, orbit.canonical_from_world);
     passed.push_back({work.frames[i]->sequence, orbit.stations[i],
                       orbit_angles(camera_center(cam)).azimuth_deg});

@@ -16,9 +16,9 @@ inline constexpr double settled_support_share = 0.6;
 /// from there, though few of its edges say so. Gables of a hut, seen from low down, had .98 to 1.01
 /// of it.
 inline constexpr double like_correlation_share = 0.95;
-/// The same, of a view that goes into the bundle on probation: its neighbours' patches can draw it
-/// to its place, where it must look as much like them as that. Wrong views of `sedan` had up to
-/// .60, right ones .84 and more.
+/// The same before the bundle, of a view that goes into it on probation: its neighbours' patches
+/// can draw it to its place, where like_correlation_share is asked of it, and patches. Before it,
+/// views of `sedan` that no place was found for had up to .60, ones that came right .84 and more.
 inline constexpr double probation_correlation_share = 0.75;
 
 /// A view that the others' temperatures contradict, from where they place it best. Supports are

@@ -74,7 +74,7 @@ Result<std::vector<Beside>> candidates(const OrbitRefinement& refinement,
 /// are turned too little against each other.
 Result<std::vector<RenderAlignedView>> bundled_anew(const OrbitRefinement& refinement,
                                                     const std::vector<Beside>& tried,
-                                                    const std::vector<std::size_t>& kept,
+                                                    const std::vector<std::size_t>& settled,
                                                     const Fit& alignment) {
   OrbitViews orbit = refinement.orbit;
   Fit wider = alignment;
@@ -87,7 +87,7 @@ Result<std::vector<RenderAlignedView>> bundled_anew(const OrbitRefinement& refin
     wider.views.back().view = one.start;
   }
   ORBITFUSE_TRY(
-      bundle_added({refinement.renderer, orbit, refinement.progress}, added, kept, {}, wider));
+      bundle_added({refinement.renderer, orbit, refinement.progress}, added, settled, {}, wider));
   return std::vector<RenderAlignedView>(
       wider.views.end() - static_cast<std::ptrdiff_t>(added.size()), wider.views.end());
 }
@@ -98,13 +98,15 @@ Result<int> try_places_beside(const OrbitRefinement& refinement, Fit& alignment)
   const TraceSpan span("places beside");
   const OrbitViews& orbit = refinement.orbit;
   const std::vector<std::size_t> kept = not_dropped(alignment);
-  if (kept.size() < least_painters) return 0;
-  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, kept));
+  std::vector<std::size_t> painters = kept;  // one on probation is no witness against others
+  std::erase_if(painters, [&](std::size_t i) { return alignment.views[i].verdict.on_probation; });
+  if (painters.size() < least_painters) return 0;
+  ORBITFUSE_ASSIGN(const SceneRenderer painted, painted_by_others(refinement, alignment, painters));
   ORBITFUSE_ASSIGN(const std::vector<Beside> tried,
                    candidates(refinement, painted, kept, alignment));
   if (tried.empty()) return 0;
   ORBITFUSE_ASSIGN(const std::vector<RenderAlignedView> bundled,
-                   bundled_anew(refinement, tried, kept, alignment));
+                   bundled_anew(refinement, tried, painters, alignment));
   std::vector<std::size_t> chosen;
   std::vector<PosedView> before, places;
   for (std::size_t c = 0; c < tried.size(); ++c) {

@@ -188,8 +188,10 @@ Status leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& pa
                    view.view.name, like_here, like_there)});
   view.verdict = verdict_of_unplaced(agree, apart, std::max(like_here, like_there));
   const bool like_enough = view.verdict.on_probation || like_there >= like_correlation_share;
-  if (view.verdict.confidence == Confidence::doubtful && like_enough && like_there > like_here)
+  if (view.verdict.confidence == Confidence::doubtful && like_enough && like_there > like_here) {
     view.view = by_temperatures;
+    view.agreement = 0, view.matches = 0;  // form's were of the place it left
+  }
   return {};
 }
 

@@ -36,7 +36,8 @@ struct TemperatureCheck {
 /// Each view judged by the temperatures of the others. Those that they contradict are searched as
 /// wholes in the scene that the rest paints, and go where both scenes then agree or temperatures
 /// are sure. One that temperatures find nowhere stays where form knows it well, as doubtful; what
-/// neither knows is dropped, or doubtful where its image is what the others measured there. Where
+/// neither knows is dropped, or doubtful where its image is what the others measured there, or on
+/// probation where it is nearly so: judge_views() settles that once the bundle has moved it. Where
 /// most are contradicted nobody is left to judge: they stay, as doubtful.
 Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement, Fit& alignment);
 

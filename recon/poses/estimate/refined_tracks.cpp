@@ -3,6 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+#include <map>
 #include <utility>
 
 #include "recon/poses/estimate/weakest_joint.hpp"
@@ -54,6 +57,41 @@ Result<RefinedTracks> aligned_model(const Reconstruction& model, const std::vect
                   aligned.rms_shift_px, aligned.left_out, aligned.added);
   if (aligned.share() < least_aligned) return none(found + "; too few to hold the views by them");
   return RefinedTracks{std::move(aligned.model), std::move(found)};
+}
+
+void add_confirmed(FeatureGraph& graph, PairMatches confirmed) {
+  for (auto& [pair, matches] : confirmed)
+    if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = std::move(matches);
+}
+
+Reconstruction triangulated(const FeatureGraph& graph, const PosedFrames& posed) {
+  TrackOptions options;
+  options.max_error_px *= graph.pixel_scale;
+  return reconstruction_of(graph, posed, triangulate_tracks(graph, graph.verified, posed, options),
+                           Modality::visible);
+}
+
+Reconstruction triangulated_again(FeatureGraph graph, const Reconstruction& model) {
+  const PosedFrames posed = posed_frames(graph, model);
+  add_confirmed(graph, confirmed_matches(graph, posed, confirming_px * graph.pixel_scale));
+  return triangulated(graph, posed);
+}
+
+double farthest_move(const Reconstruction& model, const Reconstruction& before) {
+  std::map<std::string, Eigen::Vector3d> stood;
+  for (const PosedView& view : before.views) stood[view.name] = camera_center(view.cam_from_world);
+  std::vector<Eigen::Vector3d> from, to;
+  for (const PosedView& view : model.views)
+    if (const auto it = stood.find(view.name); it != stood.end())
+      from.push_back(camera_center(view.cam_from_world)), to.push_back(it->second);
+  if (from.size() < 3) return 0;
+  const auto count = static_cast<Eigen::Index>(from.size());
+  const Eigen::Map<const Eigen::Matrix3Xd> now(from.front().data(), 3, count),
+      was(to.front().data(), 3, count);
+  const Eigen::Affine3d was_from_now(Eigen::umeyama(now, was));
+  const double radius =
+      std::sqrt((was.colwise() - was.rowwise().mean()).squaredNorm() / static_cast<double>(count));
+  return radius > 0 ? (was_from_now * now - was).colwise().norm().maxCoeff() / radius : 0;
 }
 
 BundleOptions aligned_bundle() { return {.loss_scale_px = 0.3, .max_error_px = 1.5}; }

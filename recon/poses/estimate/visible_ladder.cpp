@@ -81,6 +81,7 @@ class VisibleLadder {
     if (!selection_.has_best()) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
     if (!selection_.has_best()) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
+    if (selection_.has_best() && steps_.size() > 1) ORBITFUSE_TRY(spared(try_all_matches()));
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_joining()));
     if (selection_.has_best() && !complete()) {
       ORBITFUSE_TRY(spared(try_rematching()));
@@ -214,21 +215,35 @@ class VisibleLadder {
     const Reconstruction& known = selection_.has_best() ? selection_.best() : *selection_.part();
     const auto without = total_ - static_cast<int>(known.views.size());
     PosedFrames posed = posed_frames(graph, known);
-    // The model knows better than two-view geometry which matches hold.
-    for (auto& [pair, matches] : rematched_
-                                     ? matches_along_own_lines(graph, posed)
-                                     : confirmed_matches(graph, posed, 3 * graph.pixel_scale))
-      if (matches.size() > graph.verified[pair].size()) graph.verified[pair] = matches;
+    add_confirmed(graph, rematched_
+                             ? matches_along_own_lines(graph, posed)
+                             : confirmed_matches(graph, posed, confirming_px * graph.pixel_scale));
     ORBITFUSE_ASSIGN(const std::vector<int> added, resect(graph, posed, {}, progress_));
     const std::string found = fmt::format("{} of {} views found a place", added.size(), without);
     Reconstruction model;
-    if (!added.empty()) {
-      TrackOptions track;
-      track.max_error_px *= graph.pixel_scale;
-      model = reconstruction_of(
-          graph, posed, triangulate_tracks(graph, graph.verified, posed, track), Modality::visible);
-    }
+    if (!added.empty()) model = triangulated(graph, posed);
     selection_.consider(attempt, found, std::move(model), level);
+    return {};
+  }
+
+  /// A model that was put together step by step has points of where its views stood then: where one
+  /// was far off its true matches were outliers, and nothing that is left draws it back. They are
+  /// triangulated again while that moves a view.
+  Status try_all_matches() {
+    constexpr int most_rounds = 4;
+    ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
+    const Better draws_back = [&](const Reconstruction& model, const Reconstruction& before) {
+      return explains_as_much(graph)(model, before) && farthest_move(model, before) > least_move;
+    };
+    bool moved = true;
+    for (int round = 0; round < most_rounds && moved; ++round) {
+      tell(3, "all matches triangulated again");
+      Reconstruction model = triangulated_again(graph, selection_.best());
+      ORBITFUSE_TRY(progress_.check("poses.visible"));
+      moved = selection_.consider("all matches triangulated again",
+                                  fmt::format("{} points", model.points.size()), std::move(model),
+                                  selection_.best_level(), draws_back);
+    }
     return {};
   }
 

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/system/parallel.hpp"
+#include "recon/nerf/field/field_state.hpp"
 #include "tests/support/toy_scene.hpp"
 
 namespace orbitfuse::nerf {
@@ -273,6 +274,18 @@ TEST_P(Detail, IsTriedOnTheViewsAskedFor) {
   EXPECT_EQ(trial->views, 2);
   EXPECT_GT(trial->without, 0);
   EXPECT_GT(trial->with, 0);
+
+  // The middle half alone, as the whole view's camera sees it.
+  const auto alone = detail.try_on(field, {data.views[3].name}, {});
+  ASSERT_TRUE(alone);
+  constexpr int tried_pixels = 2 * trained_pixels;
+  const TrainingView whole = resized(data.views[3], tried_pixels, tried_pixels);
+  cv::Mat error;
+  cv::absdiff(rendered(field, whole).color, whole.image, error);
+  error = error.rowRange(tried_pixels / 4, tried_pixels - tried_pixels / 4).clone();
+  const ValueSpan range = field.state().span;
+  const double mean = cv::mean(error.reshape(1))[0] / (range.high - range.low);
+  EXPECT_NEAR(alone->without, mean, 0.05 * mean);  // a render of the half looks ahead otherwise
 
   // Of the others nothing is right but the mean.
   Dataset wrong = data;

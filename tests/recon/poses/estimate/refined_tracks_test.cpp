@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/recon/poses/feature_scene.hpp"
 #include "tests/support/orbit_fixture.hpp"
 
 namespace orbitfuse {
@@ -46,6 +47,66 @@ TEST(RefinedTracks, TooManyObservationsAreLeftAlone) {
   ASSERT_TRUE(refined);
   EXPECT_FALSE(refined->model);
   EXPECT_THAT(refined->found, HasSubstr("too many"));
+}
+
+/// A scene's machine, whose features all match as they should.
+testing_orbit::FeatureScene plain_scene() {
+  testing_orbit::FeatureScene scene =
+      testing_orbit::FeatureSceneMaker({.wrong_pillar = 0, .false_matches = 0}).make();
+  scene.graph.verified = scene.graph.proposed;
+  return scene;
+}
+
+Reconstruction posed_by(const std::vector<PosedView>& views) {
+  Reconstruction model;
+  model.views = views;
+  return model;
+}
+
+/// Two neighbours and the view above them, carried off along the orbit.
+std::vector<PosedView> with_a_block_off(std::vector<PosedView> views, double off_deg) {
+  const Eigen::Quaterniond turn(
+      Eigen::AngleAxisd(off_deg * EIGEN_PI / 180, Eigen::Vector3d::UnitZ()));
+  for (const std::size_t v : {3, 4, 15})
+    views[v].cam_from_world = views[v].cam_from_world * Rigid3d{turn, Eigen::Vector3d::Zero()};
+  return views;
+}
+
+double adjusted_error(Reconstruction& model, const Reconstruction& truth) {
+  const std::vector<int> group(model.views.size(), 0);
+  LensGroup lens;
+  lens.focal_px = model.views[0].camera.fx;
+  EXPECT_TRUE(adjust_bundle(model, group, {lens}, {}));
+  return farthest_move(model, truth);
+}
+
+TEST(RefinedTracks, AllMatchesDrawBackABlockThatStoodElsewhere) {
+  const testing_orbit::FeatureScene scene = plain_scene();
+  const Reconstruction truth = posed_by(scene.truth);
+  // As a mapper leaves it: its points are those that fit the block's place.
+  const Reconstruction off = posed_by(with_a_block_off(scene.truth, 10));
+  Reconstruction model = triangulated(scene.graph, posed_frames(scene.graph, off));
+  const double as_left = adjusted_error(model, truth);
+  EXPECT_GT(as_left, 0.003);
+  model = triangulated_again(scene.graph, model);
+  EXPECT_LT(adjusted_error(model, truth), 0.3 * as_left);
+}
+
+TEST(RefinedTracks, MovesAreThoseWithinTheModelWhateverItsFrame) {
+  const std::vector<PosedView> views = two_loops();
+  std::vector<PosedView> elsewhere = views;
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(2, Eigen::Vector3d(1, 2, 3).normalized()));
+  for (PosedView& view : elsewhere) {
+    view.cam_from_world = view.cam_from_world * Rigid3d{turn, Eigen::Vector3d(4, -5, 6)};
+    view.cam_from_world.translation *= 1e3;
+  }
+  EXPECT_LT(farthest_move(posed_by(elsewhere), posed_by(views)), 1e-9);
+  elsewhere[5].cam_from_world.translation += Eigen::Vector3d(0, 0, 100);
+  EXPECT_GT(farthest_move(posed_by(elsewhere), posed_by(views)), 0.01);
+
+  EXPECT_EQ(farthest_move(posed_by({views[0], views[1]}), posed_by(views)), 0);
+  EXPECT_EQ(farthest_move(posed_by({}), posed_by({})), 0);
+  EXPECT_EQ(farthest_move(posed_by(std::vector(4, views[0])), posed_by({views[0]})), 0);
 }
 
 }  // namespace
