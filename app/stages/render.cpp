@@ -73,14 +73,14 @@ Status load_detail(const StageContext& context, const StageInputs& in, const New
                                             {"error_without", trial.without},
                                             {"error_with", trial.with}};
     if (shown.detail.empty())
-      output.skips.push_back(
-          {fmt::format("detail of the {} frames in new views", name(modality)),
-           trial.views > 0
-               ? fmt::format(
-                     "{} recorded ones are {:.1f} % of the range off with it, {:.1f} without",
-                     trial.views, 100 * trial.with, 100 * trial.without)
-               : "there is no recorded view to try it on",
-           "new views show the field alone"});
+      output.skips.push_back({fmt::format("detail of the {} frames in new views", name(modality)),
+                              trial.views > 0
+                                  ? fmt::format("{} recorded ones (their middle halves) are {:.1f} "
+                                                "% of the range off with it, "
+                                                "{:.1f} without",
+                                                trial.views, 100 * trial.with, 100 * trial.without)
+                                  : "there is no recorded view to try it on",
+                              "new views show the field alone"});
     return {};
   };
   ORBITFUSE_TRY(load(fields.visible));

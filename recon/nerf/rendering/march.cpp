@@ -89,8 +89,8 @@ struct Walk {
   std::vector<Turn> turns = std::vector<Turn>(512);  ///< grows to what rays need
 };
 
-/// Crosses blocks cell by cell, empty and plain ones in one step. Reads only what lies in the L1
-/// cache: the next step waits for it.
+/// Crosses blocks cell by cell, empty and plain ones in one step. What the next step waits for is
+/// small enough to stay in the L1 cache; cells' contents are asked for, not read.
 void walk_through(const Occupancy& grid, const Lanes& lanes, Walk& walk) {
   const __m256 half_resolution = _mm256_set1_ps(0.5f * static_cast<float>(grid.resolution));
   const __m256 cell_per_cube = _mm256_set1_ps(grid.cell_size(0));
