@@ -240,8 +240,8 @@ class VisibleLadder {
       tell(3, "all matches triangulated again");
       Reconstruction model = triangulated_again(graph, selection_.best());
       ORBITFUSE_TRY(progress_.check("poses.visible"));
-      moved = selection_.consider("all matches triangulated again",
-                                  fmt::format("{} points", model.points.size()), std::move(model),
+      const std::string found = fmt::format("{} points", model.points.size());
+      moved = selection_.consider("all matches triangulated again", found, std::move(model),
                                   selection_.best_level(), draws_back);
     }
     return {};
