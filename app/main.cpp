@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -14,6 +15,7 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
+#include <new>
 #include <optional>
 #include <vector>
 
@@ -210,9 +212,17 @@ int main(int argc, char** argv) {
   set_up_ffmpeg();
   // Ceres' remarks belong to no terminal either: what its callers can't use, they say themselves.
   FLAGS_minloglevel = google::GLOG_FATAL;
+  // A file that outgrows `ulimit -f` is a disk that takes no more, told like one.
+  std::signal(SIGXFSZ, SIG_IGN);
   int code = orbitfuse::terminal::exit_internal;
   try {
     code = orbitfuse::run(orbitfuse::words_of(argc, argv));
+  } catch (const std::bad_alloc&) {
+    std::fputs(
+        "error: memory: no more is to be had; free some or raise the limit (ulimit -v, the job's "
+        "memory), or ask for smaller images and fewer --threads\n",
+        stderr);
+    code = orbitfuse::terminal::exit_device;
   } catch (const std::exception& bug) {
     std::fprintf(stderr, "internal error: %s; please report it with the command line\n",
                  bug.what());

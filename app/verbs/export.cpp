@@ -171,6 +171,11 @@ Status export_surface(Context& context, const std::vector<fs::path>& files,
           "no ground was found, and nothing left out: the object hangs free, or what it stands on "
           "ends within the box or is not level; --crop-box cuts by hand");
   }
+  const auto asked = static_cast<std::size_t>(request.surface.surface.triangles);
+  if (surface.mesh.triangles.size() > asked)
+    context.console.warning(
+        fmt::format("{} triangles were asked for, {} are left: the simplifier goes no further",
+                    asked, surface.mesh.triangles.size()));
   context.result["files"] = nlohmann::json::array();
   for (const fs::path& file : files) {
     ORBITFUSE_TRY(write_surface(file, run, surface, frame, how));

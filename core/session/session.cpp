@@ -167,6 +167,9 @@ Result<Session> open_session(const std::filesystem::path& folder) {
       return fail(ErrorKind::input, where, "the first line is not a session header",
                   "restore the manifest from a backup");
     }
+    if (number > 1 && type != json.end() && *type == "session")
+      return fail(ErrorKind::input, where, "a second session header",
+                  "restore the manifest from a backup");
     ORBITFUSE_TRY(apply(json, where, session, index));
     if (is_last) break;
     at = end + 1;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <fstream>
 #include <map>
 #include <string_view>
 
@@ -51,6 +52,16 @@ std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t 
 /// A Mac leaves "._IMG_1.jpg" beside IMG_1.jpg on cards and sticks: no image, and as one in front
 /// of all others it would shift the stations of those.
 bool is_of_mac(const fs::path& file) { return file.filename().string().starts_with("._"); }
+
+/// A JPEG, PNG or TIFF by its first bytes.
+bool begins_like_an_image(const fs::path& file) {
+  std::array<char, 4> read{};
+  std::ifstream(file, std::ios::binary).read(read.data(), read.size());
+  const std::string_view bytes(read.data(), read.size());
+  using namespace std::string_view_literals;
+  return bytes.starts_with("\xff\xd8\xff"sv) || bytes == "\x89PNG"sv || bytes == "II*\0"sv ||
+         bytes == "MM\0*"sv;
+}
 
 bool holds_images(Modality modality, const fs::path& folder) {
   std::error_code error;
@@ -169,6 +180,8 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
       else if (const std::string kind = unread_kind(entry.path());
                !kind.empty() && (kind != table || modality == Modality::thermal))
         list.unread.push_back(entry.path());
+      else if (!entry.path().has_extension() && begins_like_an_image(entry.path()))
+        list.nameless.push_back(entry.path());
     }
     // Phones leave a clip of seconds beside each photo: among photos a video is taken for one.
     std::vector<fs::path>& wanted = files.size() == before ? files : list.videos_among_photos;

@@ -15,6 +15,8 @@ struct ImageList {
   std::vector<std::filesystem::path> images;
   /// Pictures and videos in formats that are not read: who put them there expects them.
   std::vector<std::filesystem::path> unread;
+  /// Images by their first bytes, whose names have no extension.
+  std::vector<std::filesystem::path> nameless;
   /// Named like images, but nothing that could be read: links to nothing, pipes, devices.
   std::vector<std::filesystem::path> no_files;
   /// In a folder that also holds photos: they may be parts of those (Live Photos), so they are

@@ -70,6 +70,10 @@ class Gathering {
                           ? "16-bit TIFF or PNG (100 x kelvin), which keep temperatures"
                           : "JPEG, PNG or TIFF"));
     }
+    for (const fs::path& file : list.nameless) {
+      remarks_.left_out(file.string(),
+                        "an image whose name has no extension; rename it (.jpg, .png, .tiff)");
+    }
     for (const auto& [link, file] : list.links) {
       remarks_.left_out(link.string(), "the same image as " + file.filename().string(), "a link");
     }

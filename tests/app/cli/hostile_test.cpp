@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+
 #include <fstream>
 #include <regex>
 #include <set>
@@ -43,6 +45,38 @@ class Hostile : public testing::Test {
   }
   const test::TempFolder temp;
 };
+
+TEST_F(Hostile, ImagesWithoutAnExtensionAreNamed) {
+  put_pair();
+  fs::create_directory(path("photos"));
+  fs::copy_file(path("v.png"), path("photos/a.png"));
+  cv::Mat other(48, 64, CV_8UC3);
+  cv::randu(other, 0, 200);
+  ASSERT_TRUE(write_png(path("b.png"), other));
+  fs::rename(path("b.png"), path("photos/b"));
+  std::ofstream(path("photos/README")) << "of no interest";
+  const Outcome outcome = orbitfuse_program({"import", path("s"), "--visible", path("photos")},
+                                            {.folder = temp.path()});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err + outcome.out,
+              HasSubstr("photos/b: an image whose name has no extension"));
+  EXPECT_THAT(outcome.err + outcome.out, Not(HasSubstr("README")));
+}
+
+TEST_F(Hostile, AFileThatOutgrowsItsLimitIsTold) {
+  put_pair();
+  fs::create_directory(path("photos"));
+  fs::copy_file(path("v.png"), path("photos/a.png"));
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const rlimit small{4096, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const Outcome outcome = orbitfuse_program({"import", path("s"), "--visible", path("photos")},
+                                            {.folder = temp.path()});
+  setrlimit(RLIMIT_FSIZE, &before);
+  refused(outcome, 4, "000000.png");
+  EXPECT_FALSE(fs::exists(path("s/visible/000000.png")));
+}
 
 TEST_F(Hostile, FuseWritesWhereItIsToldAndNowhereElse) {
   put_pair();

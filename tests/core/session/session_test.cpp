@@ -338,6 +338,13 @@ TEST_F(SessionTest, ATypeThatIsNoWordIsNamed) {
   EXPECT_FALSE(open(text));
 }
 
+TEST_F(SessionTest, ASecondHeaderIsRefused) {
+  const std::string text = manifest();
+  const auto s = open(text + text);
+  ASSERT_FALSE(s);
+  EXPECT_EQ(s.error().found, "a second session header");
+}
+
 TEST_F(SessionTest, LaterLineAboutAFileAmendsIt) {
   FrameRecord chosen = full_frame();
   chosen.tracking = false;
