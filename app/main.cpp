@@ -16,6 +16,7 @@
 #include <functional>
 #include <iostream>
 #include <new>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
@@ -208,6 +209,18 @@ static void set_up_ffmpeg() {
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
 }
 
+static int tell_out_of_memory() {
+  std::fputs(
+      "error: memory: no more is to be had; free some or raise the limit (ulimit -v, the job's "
+      "memory), or ask for smaller images and fewer --threads\n",
+      stderr);
+  return orbitfuse::terminal::exit_device;
+}
+
+static void tell_bug(const char* what) {
+  std::fprintf(stderr, "internal error: %s; please report it with the command line\n", what);
+}
+
 int main(int argc, char** argv) {
   set_up_ffmpeg();
   // Ceres' remarks belong to no terminal either: what its callers can't use, they say themselves.
@@ -218,14 +231,14 @@ int main(int argc, char** argv) {
   try {
     code = orbitfuse::run(orbitfuse::words_of(argc, argv));
   } catch (const std::bad_alloc&) {
-    std::fputs(
-        "error: memory: no more is to be had; free some or raise the limit (ulimit -v, the job's "
-        "memory), or ask for smaller images and fewer --threads\n",
-        stderr);
-    code = orbitfuse::terminal::exit_device;
+    code = tell_out_of_memory();
+  } catch (const cv::Exception& bug) {
+    if (bug.code == cv::Error::StsNoMem)
+      code = tell_out_of_memory();
+    else
+      tell_bug(bug.what());
   } catch (const std::exception& bug) {
-    std::fprintf(stderr, "internal error: %s; please report it with the command line\n",
-                 bug.what());
+    tell_bug(bug.what());
   } catch (...) {
     std::fputs("internal error; please report it with the command line\n", stderr);
   }

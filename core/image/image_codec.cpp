@@ -57,7 +57,8 @@ cv::Mat stored_bmp(std::string_view bytes) {
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8UC1,
                          const_cast<char*>(bytes.data()));
     image = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw;
     image.release();
   }
   return image;
@@ -92,7 +93,8 @@ Result<std::string> encoded(const Encode& encode, const char* what) {
   bool ok = false;
   try {
     ok = encode(buffer);
-  } catch (const cv::Exception&) {
+  } catch (const cv::Exception& error) {
+    if (error.code == cv::Error::StsNoMem) throw;
   }
   if (!ok) return fail(ErrorKind::device, what, "encoder failed", "report this");
   return std::string(buffer.begin(), buffer.end());

@@ -32,7 +32,11 @@ Result<pid_t> start(const std::vector<std::string>& command, const std::filesyst
   posix_spawn_file_actions_adddup2(&files, STDOUT_FILENO, STDERR_FILENO);
   posix_spawnattr_t attributes;  // own group: a terminal's Ctrl-C reaches us, we end the child
   posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP | POSIX_SPAWN_SETSIGDEF);
+  sigset_t usual;  // that we ignore SIGXFSZ is no business of a child's, which may not look
+  sigemptyset(&usual);
+  sigaddset(&usual, SIGXFSZ);
+  posix_spawnattr_setsigdefault(&attributes, &usual);
 
   pid_t pid = 0;
   const int error =

@@ -163,7 +163,8 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
           ErrorKind::input, path.string(), error.message(),
           error == std::errc::permission_denied ? "check its permissions" : "check the path");
     }
-    const std::size_t before = files.size(), unread_before = list.unread.size();
+    const std::size_t before = files.size(), unread_before = list.unread.size(),
+                      nameless_before = list.nameless.size();
     std::vector<fs::path> videos;
     for (const fs::directory_entry& entry : folder) {
       const bool is_folder = entry.is_directory(error);
@@ -180,12 +181,19 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
       else if (const std::string kind = unread_kind(entry.path());
                !kind.empty() && (kind != table || modality == Modality::thermal))
         list.unread.push_back(entry.path());
-      else if (!entry.path().has_extension() && begins_like_an_image(entry.path()))
+      else if (!entry.path().has_extension() && !entry.is_symlink(error) &&
+               begins_like_an_image(entry.path()))
         list.nameless.push_back(entry.path());
     }
     // Phones leave a clip of seconds beside each photo: among photos a video is taken for one.
     std::vector<fs::path>& wanted = files.size() == before ? files : list.videos_among_photos;
     wanted.insert(wanted.end(), videos.begin(), videos.end());
+    if (files.size() == before && list.nameless.size() > nameless_before)
+      return fail(ErrorKind::input, path.string(),
+                  fmt::format("{} images whose names have no extension ({})",
+                              list.nameless.size() - nameless_before,
+                              list.nameless.back().filename().string()),
+                  "rename them (.jpg, .png, .tiff)");
     if (files.size() == before) {
       const bool other = list.unread.size() > unread_before;
       return fail(
@@ -203,6 +211,7 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
     return natural_less(a.filename().string(), b.filename().string());
   });
   std::sort(list.unread.begin(), list.unread.end());
+  std::sort(list.nameless.begin(), list.nameless.end());
   std::sort(list.no_files.begin(), list.no_files.end());
   std::sort(list.videos_among_photos.begin(), list.videos_among_photos.end());
   return list;

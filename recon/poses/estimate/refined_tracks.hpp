@@ -49,9 +49,9 @@ Reconstruction triangulated_again(FeatureGraph graph, const Reconstruction& mode
 /// share of the RMS distance of the centers from their middle. 0 for less than three views.
 double farthest_move(const Reconstruction& model, const Reconstruction& before);
 
-/// What tells a model that was not settled: triangulated again, the views of settled ones of four
-/// scenes moved by 0.12 to 0.68 %, those of two that were 0.5 and 2.1 % of the extent off by 1.0
-/// and 2.1 (docs/notes/poses_visible.md).
+/// Below it nothing is gained: triangulated again, models of four scenes whose views stood right
+/// moved by 0.12 to 0.68 %, those with views 0.5, 2.1 and 6.6 % of the extent off by 0.96, 2.05 and
+/// 1.33 (docs/notes/poses_visible.md).
 inline constexpr double least_move = 0.005;
 
 /// For what patches place: they lie within a tenth of a pixel, descriptors' centres within a half.

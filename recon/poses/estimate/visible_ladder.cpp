@@ -232,8 +232,9 @@ class VisibleLadder {
   Status try_all_matches() {
     constexpr int most_rounds = 4;
     ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
+    const Reconstruction first = selection_.best();
     const Better draws_back = [&](const Reconstruction& model, const Reconstruction& before) {
-      return explains_as_much(graph)(model, before) && farthest_move(model, before) > least_move;
+      return explains_as_much(graph)(model, first) && farthest_move(model, before) > least_move;
     };
     bool moved = true;
     for (int round = 0; round < most_rounds && moved; ++round) {

@@ -61,6 +61,11 @@ TEST_F(Hostile, ImagesWithoutAnExtensionAreNamed) {
   EXPECT_THAT(outcome.err + outcome.out,
               HasSubstr("photos/b: an image whose name has no extension"));
   EXPECT_THAT(outcome.err + outcome.out, Not(HasSubstr("README")));
+
+  fs::remove(path("photos/a.png"));
+  refused(orbitfuse_program({"import", path("none"), "--visible", path("photos")},
+                            {.folder = temp.path()}),
+          3, "1 images whose names have no extension (b); rename them");
 }
 
 TEST_F(Hostile, AFileThatOutgrowsItsLimitIsTold) {
