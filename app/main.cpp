@@ -209,16 +209,11 @@ static void set_up_ffmpeg() {
   ::setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", 0);
 }
 
-static int tell_out_of_memory() {
-  std::fputs(
-      "error: memory: no more is to be had; free some or raise the limit (ulimit -v, the job's "
-      "memory), or ask for smaller images and fewer --threads\n",
-      stderr);
-  return orbitfuse::terminal::exit_device;
-}
-
-static void tell_bug(const char* what) {
-  std::fprintf(stderr, "internal error: %s; please report it with the command line\n", what);
+/// OpenCV has an exception of its own for it.
+static bool is_out_of_memory(const std::exception& error) {
+  const auto* of_opencv = dynamic_cast<const cv::Exception*>(&error);
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+         (of_opencv != nullptr && of_opencv->code == cv::Error::StsNoMem);
 }
 
 int main(int argc, char** argv) {
@@ -230,15 +225,17 @@ int main(int argc, char** argv) {
   int code = orbitfuse::terminal::exit_internal;
   try {
     code = orbitfuse::run(orbitfuse::words_of(argc, argv));
-  } catch (const std::bad_alloc&) {
-    code = tell_out_of_memory();
-  } catch (const cv::Exception& bug) {
-    if (bug.code == cv::Error::StsNoMem)
-      code = tell_out_of_memory();
-    else
-      tell_bug(bug.what());
-  } catch (const std::exception& bug) {
-    tell_bug(bug.what());
+  } catch (const std::exception& error) {
+    if (is_out_of_memory(error)) {
+      std::fputs(
+          "error: memory: no more is to be had; free some or raise the limit (ulimit -v, the job's "
+          "memory), or ask for smaller images and fewer --threads\n",
+          stderr);
+      code = orbitfuse::terminal::exit_device;
+    } else {
+      std::fprintf(stderr, "internal error: %s; please report it with the command line\n",
+                   error.what());
+    }
   } catch (...) {
     std::fputs("internal error; please report it with the command line\n", stderr);
   }

@@ -163,12 +163,10 @@ Result<Session> open_session(const std::filesystem::path& folder) {
                   "restore the manifest from a backup");
     }
     const auto type = json.find("type");
-    if (number == 1 && (type == json.end() || *type != "session")) {
-      return fail(ErrorKind::input, where, "the first line is not a session header",
-                  "restore the manifest from a backup");
-    }
-    if (number > 1 && type != json.end() && *type == "session")
-      return fail(ErrorKind::input, where, "a second session header",
+    const bool is_header = type != json.end() && *type == "session";
+    if (is_header != (number == 1))
+      return fail(ErrorKind::input, where,
+                  is_header ? "a second session header" : "the first line is not a session header",
                   "restore the manifest from a backup");
     ORBITFUSE_TRY(apply(json, where, session, index));
     if (is_last) break;

@@ -10,6 +10,7 @@
 #include <map>
 #include <string_view>
 
+#include "core/image/image_codec.hpp"
 #include "drivers/stills/video_frames.hpp"
 
 namespace orbitfuse {
@@ -53,14 +54,12 @@ std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t 
 /// of all others it would shift the stations of those.
 bool is_of_mac(const fs::path& file) { return file.filename().string().starts_with("._"); }
 
-/// A JPEG, PNG or TIFF by its first bytes.
+/// A JPEG, PNG or TIFF by its first bytes; those of a BMP begin many a text.
 bool begins_like_an_image(const fs::path& file) {
-  std::array<char, 4> read{};
+  std::array<char, 8> read{};
   std::ifstream(file, std::ios::binary).read(read.data(), read.size());
-  const std::string_view bytes(read.data(), read.size());
-  using namespace std::string_view_literals;
-  return bytes.starts_with("\xff\xd8\xff"sv) || bytes == "\x89PNG"sv || bytes == "II*\0"sv ||
-         bytes == "MM\0*"sv;
+  const ImageFormat format = image_format({read.data(), read.size()});
+  return format != ImageFormat::unknown && format != ImageFormat::bmp;
 }
 
 bool holds_images(Modality modality, const fs::path& folder) {

@@ -3,11 +3,12 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
 
+#include "core/geometry/pose_error.hpp"
 #include "recon/poses/estimate/weakest_joint.hpp"
 #include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/patches/aligned_tracks.hpp"
@@ -78,20 +79,25 @@ Reconstruction triangulated_again(FeatureGraph graph, const Reconstruction& mode
 }
 
 double farthest_move(const Reconstruction& model, const Reconstruction& before) {
-  std::map<std::string, Eigen::Vector3d> stood;
-  for (const PosedView& view : before.views) stood[view.name] = camera_center(view.cam_from_world);
-  std::vector<Eigen::Vector3d> from, to;
+  std::map<std::string, Rigid3d> stood;
+  for (const PosedView& view : before.views) stood[view.name] = view.cam_from_world;
+  std::vector<PosePair> pairs;
   for (const PosedView& view : model.views)
     if (const auto it = stood.find(view.name); it != stood.end())
-      from.push_back(camera_center(view.cam_from_world)), to.push_back(it->second);
-  if (from.size() < 3) return 0;
-  const auto count = static_cast<Eigen::Index>(from.size());
-  const Eigen::Map<const Eigen::Matrix3Xd> now(from.front().data(), 3, count),
-      was(to.front().data(), 3, count);
-  const Eigen::Affine3d was_from_now(Eigen::umeyama(now, was));
-  const double radius =
-      std::sqrt((was.colwise() - was.rowwise().mean()).squaredNorm() / static_cast<double>(count));
-  return radius > 0 ? (was_from_now * now - was).colwise().norm().maxCoeff() / radius : 0;
+      pairs.push_back({view.cam_from_world, it->second});
+  const auto before_from_model = truth_from_estimate(pairs);
+  if (!before_from_model) return 0;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const PosePair& pair : pairs) middle += camera_center(pair.cam_from_truth);
+  middle /= static_cast<double>(pairs.size());
+  double squares = 0, farthest = 0;
+  for (const PosePair& pair : pairs) {
+    const Eigen::Vector3d was = camera_center(pair.cam_from_truth);
+    const Eigen::Vector3d now = camera_center(rebase(pair.cam_from_estimate, *before_from_model));
+    squares += (was - middle).squaredNorm();
+    farthest = std::max(farthest, (now - was).norm());
+  }
+  return farthest / std::sqrt(squares / static_cast<double>(pairs.size()));
 }
 
 BundleOptions aligned_bundle() { return {.loss_scale_px = 0.3, .max_error_px = 1.5}; }

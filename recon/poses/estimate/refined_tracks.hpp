@@ -46,7 +46,8 @@ Reconstruction triangulated(const FeatureGraph& graph, const PosedFrames& posed)
 Reconstruction triangulated_again(FeatureGraph graph, const Reconstruction& model);
 
 /// How far a view of both models has moved, at most, when one is laid over the other as a whole: a
-/// share of the RMS distance of the centers from their middle. 0 for less than three views.
+/// share of the RMS distance of the centers from their middle. 0 for less than three views,
+/// and where they stand on a line: nothing lays these over each other.
 double farthest_move(const Reconstruction& model, const Reconstruction& before);
 
 /// Below it nothing is gained: triangulated again, models of four scenes whose views stood right
