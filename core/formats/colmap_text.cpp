@@ -4,6 +4,7 @@
 #include <sstream>
 
 #include "core/formats/colmap_records.hpp"
+#include "core/json_fields.hpp"
 #include "core/system/file_io.hpp"
 
 namespace orbitfuse::colmap {
@@ -29,9 +30,10 @@ class Lines {
   int number_ = 0;
 };
 
-tl::unexpected<Error> unreadable(const std::filesystem::path& file, int line) {
-  return fail(ErrorKind::input, fmt::format("{}:{}", file.string(), line), "unreadable line",
-              "export the model again");
+tl::unexpected<Error> unreadable(const std::filesystem::path& file, const Lines& lines,
+                                 const std::string& line) {
+  return fail(ErrorKind::input, fmt::format("{}:{}", file.string(), lines.number()),
+              "unreadable line: " + shown(nlohmann::json(line)), "export the model again");
 }
 
 bool blank(const std::string& line) { return line.find_first_not_of(" \t") == std::string::npos; }
@@ -46,13 +48,13 @@ Result<std::vector<CameraRecord>> read_text_cameras(const std::filesystem::path&
     CameraRecord camera;
     std::string model;
     if (!(words >> camera.id >> model >> camera.width >> camera.height))
-      return unreadable(file, lines.number());
+      return unreadable(file, lines, line);
     const auto id = model_id(model);
     if (!id) return unknown_model(fmt::format("{}:{}", file.string(), lines.number()), model);
     camera.model = *id;
     camera.parameters.resize(*parameter_count(*id));
     for (double& p : camera.parameters) {
-      if (!(words >> p)) return unreadable(file, lines.number());
+      if (!(words >> p)) return unreadable(file, lines, line);
     }
     cameras.push_back(std::move(camera));
   }
@@ -71,19 +73,20 @@ Result<std::vector<ImageRecord>> read_text_images(const std::filesystem::path& f
     auto& t = image.cam_from_world.translation;
     if (!(words >> image.id >> q.w() >> q.x() >> q.y() >> q.z() >> t.x() >> t.y() >> t.z() >>
           image.camera)) {
-      return unreadable(file, lines.number());
+      return unreadable(file, lines, line);
     }
     words >> std::ws;
     std::getline(words, image.name);  // names may hold spaces
-    if (image.name.empty() || !lines.next(line)) return unreadable(file, lines.number());
+    if (image.name.empty() || !lines.next(line)) return unreadable(file, lines, line);
     std::istringstream pixels(line);
     double x, y;
     std::int64_t point;
     while (pixels >> x) {
-      if (!(pixels >> y >> point)) return unreadable(file, lines.number());
+      if (!(pixels >> y >> point)) return unreadable(file, lines, line);
       image.pixels.emplace_back(x, y);
       image.points.push_back(point);
     }
+    if (!pixels.eof()) return unreadable(file, lines, line);
     images.push_back(std::move(image));
   }
   return images;
@@ -102,15 +105,16 @@ Result<std::vector<PointRecord>> read_text_points(const std::filesystem::path& f
     int r, g, b;
     auto& p = point.position;
     if (!(words >> point.id >> p.x() >> p.y() >> p.z() >> r >> g >> b >> point.error)) {
-      return unreadable(file, lines.number());
+      return unreadable(file, lines, line);
     }
     point.rgb = {static_cast<std::uint8_t>(r), static_cast<std::uint8_t>(g),
                  static_cast<std::uint8_t>(b)};
     std::uint32_t image, index;
     while (words >> image) {
-      if (!(words >> index)) return unreadable(file, lines.number());
+      if (!(words >> index)) return unreadable(file, lines, line);
       point.track.emplace_back(image, index);
     }
+    if (!words.eof()) return unreadable(file, lines, line);
     points.push_back(std::move(point));
   }
   return points;

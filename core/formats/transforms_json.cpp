@@ -161,6 +161,8 @@ Result<Transforms> read_transforms_json(const std::filesystem::path& file) {
     if (frame.contains("thermal_file_path") && frame["thermal_file_path"].is_string()) {
       out.thermal_file_path = frame["thermal_file_path"].get<std::string>();
     }
+    for (const char* key : {"mask_path", "depth_file_path"})
+      if (!field(frame, root, key).is_null()) ++transforms.unused[key];
     ORBITFUSE_ASSIGN(out.camera, read_camera(frame, root, where));
     ORBITFUSE_ASSIGN(
         out.cam_from_world,

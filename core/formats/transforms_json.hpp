@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -21,6 +22,9 @@ struct TransformsFrame {
 
 struct Transforms {
   std::vector<TransformsFrame> frames;
+  /// Read only: in how many frames there is a file that nothing here uses, by its key
+  /// ("mask_path").
+  std::map<std::string, int> unused = {};
 };
 
 /// nerfstudio / instant-ngp transforms.json: OpenGL camera-to-world there, turned to Camera's axes

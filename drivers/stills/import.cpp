@@ -155,6 +155,8 @@ class Importer {
         continue;
       }
       tell_other_pages(file->other_pages, source);
+      if (!file->two_scales.empty())
+        remarks_.add_of_file("", source.short_name(), file->two_scales);
       Result<StillPhoto> still = thermal_still(*file, decoder_, source.where());
       if (!still) {
         pass_over(still.error());

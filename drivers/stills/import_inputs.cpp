@@ -22,7 +22,7 @@ class Gathering {
       : options_(options), folder_(folder), decoder_(decoder), remarks_(remarks) {}
 
   Result<ImportInputs> run() {
-    ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_));
+    ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_, remarks_));
     ORBITFUSE_ASSIGN(const auto visible, visible_sources());
     ORBITFUSE_ASSIGN(const auto visible_tracking,
                      listed(Modality::visible, options_.visible_tracking));
@@ -176,7 +176,9 @@ class Gathering {
   std::vector<fs::path> files_of_transforms(Modality modality) const {
     std::vector<fs::path> files;
     if (!options_.transforms_json || !inputs_.known.count(modality)) return files;
-    for (const KnownView& view : inputs_.known.at(modality).all()) files.push_back(view.file);
+    std::set<fs::path> named;  // a file may have several poses, and is one frame
+    for (const KnownView& view : inputs_.known.at(modality).all())
+      if (named.insert(view.file).second) files.push_back(view.file);
     return files;
   }
 

@@ -24,8 +24,12 @@ fs::path resolve(const fs::path& base, const std::string& name) {
   return path;
 }
 
-Status add_transforms(const fs::path& file, std::map<Modality, KnownViews>& known) {
+Status add_transforms(const fs::path& file, std::map<Modality, KnownViews>& known,
+                      Remarks& remarks) {
   ORBITFUSE_ASSIGN(const Transforms transforms, read_transforms_json(file));
+  for (const auto& [key, frames] : transforms.unused)
+    remarks.add(fmt::format("{}: {} of {} frames is not used: all of an image is taken",
+                            file.filename().string(), key, frames));
   for (const TransformsFrame& frame : transforms.frames) {
     known[Modality::visible].add(
         {resolve(file.parent_path(), frame.file_path), frame.camera, frame.cam_from_world, {}});
@@ -72,6 +76,12 @@ std::size_t common_end(const fs::path& image, const fs::path& view) {
   return common;
 }
 
+bool same_view(const KnownView& a, const KnownView& b) {
+  if (!(a.camera == b.camera) || a.cam_from_world.has_value() != b.cam_from_world.has_value())
+    return false;
+  return !a.cam_from_world || a.cam_from_world->matrix() == b.cam_from_world->matrix();
+}
+
 /// Ambiguous: no pose is better than a wrong one.
 template <class Map>
 typename Map::const_iterator only_largest(const Map& values) {
@@ -90,7 +100,8 @@ typename Map::const_iterator only_largest(const Map& values) {
 
 void KnownViews::add(KnownView view) {
   const std::size_t index = views_.size();
-  by_file_.emplace(canonical_name(view.file), index);
+  const auto [first, is_new] = by_file_.emplace(canonical_name(view.file), index);
+  if (!is_new && !same_view(views_[first->second], view)) contradicted_.insert(first->first);
   by_name_[view.file.filename().string()].push_back(index);
   by_stem_[view.file.stem().string()].push_back(index);
   views_.push_back(std::move(view));
@@ -110,8 +121,9 @@ void KnownViews::tell_apart(const std::vector<fs::path>& images) {
 }
 
 const KnownView* KnownViews::find(const fs::path& file) const {
-  if (without_.contains(canonical_name(file))) return nullptr;
-  if (const auto same = by_file_.find(canonical_name(file)); same != by_file_.end())
+  const std::string canonical = canonical_name(file);
+  if (without_.contains(canonical) || contradicted_.contains(canonical)) return nullptr;
+  if (const auto same = by_file_.find(canonical); same != by_file_.end())
     return &views_[same->second];
   for (const auto& [names, name] :
        {std::pair{&by_name_, file.filename().string()}, {&by_stem_, file.stem().string()}}) {
@@ -127,6 +139,8 @@ const KnownView* KnownViews::find(const fs::path& file) const {
 }
 
 std::string KnownViews::ambiguity(const fs::path& file) const {
+  if (contradicted_.contains(canonical_name(file)))
+    return fmt::format("{} has two different poses", file.string());
   if (without_.contains(canonical_name(file)))
     return fmt::format("{} has the name of another image", file.string());
   const auto named = by_name_.find(file.filename().string());
@@ -161,12 +175,14 @@ Result<std::map<Modality, KnownViews>> read_ground_truth_views(const fs::path& f
   return known;
 }
 
-Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& options) {
+Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& options,
+                                                        Remarks& remarks) {
   std::map<Modality, KnownViews> known;
   if (options.ground_truth) {
     ORBITFUSE_ASSIGN(known, read_ground_truth_views(*options.ground_truth));
   }
-  if (options.transforms_json) ORBITFUSE_TRY(add_transforms(*options.transforms_json, known));
+  if (options.transforms_json)
+    ORBITFUSE_TRY(add_transforms(*options.transforms_json, known, remarks));
   if (options.visible_colmap)
     ORBITFUSE_TRY(add_colmap(*options.visible_colmap, Modality::visible, known));
   if (options.thermal_colmap)

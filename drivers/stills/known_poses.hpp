@@ -14,6 +14,7 @@
 #include "core/modality.hpp"
 #include "core/result.hpp"
 #include "drivers/stills/import.hpp"
+#include "drivers/stills/remarks.hpp"
 
 namespace orbitfuse {
 
@@ -32,7 +33,7 @@ class KnownViews {
   /// have it, or none of them.
   void tell_apart(const std::vector<std::filesystem::path>& images);
   /// The same file, else the view with its file name, else with its stem; of several the one with
-  /// most of the folders above it, if that is one.
+  /// most of the folders above it, if that is one. A file with two different poses has none.
   const KnownView* find(const std::filesystem::path& file) const;
   /// Why a file whose name is there has no view: "000.jpg is there 2 times (left, right)"; else
   /// empty.
@@ -47,11 +48,14 @@ class KnownViews {
   std::vector<KnownView> views_;
   std::unordered_map<std::string, std::size_t> by_file_;
   std::unordered_map<std::string, Indices> by_name_, by_stem_;
-  std::set<std::string> without_;  ///< images that another one took the view from
+  std::set<std::string> without_;       ///< images that another one took the view from
+  std::set<std::string> contradicted_;  ///< files with two views that differ
 };
 
-/// Reads the sources that `options` name, visible and thermal.
-Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& options);
+/// Reads the sources that `options` name, visible and thermal; what they hold and nothing uses is
+/// told.
+Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& options,
+                                                        Remarks& remarks);
 
 /// ground_truth.json: K, and c2w per frame, of "visible" and "thermal" (docs/formats.md).
 Result<std::map<Modality, KnownViews>> read_ground_truth_views(const std::filesystem::path& file);

@@ -112,10 +112,16 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
   ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
   const std::filesystem::path sidecar = where + ".json";  // also of a DJI file: the user's word
   std::error_code ignored;
-  if (!file.tag && std::filesystem::exists(sidecar, ignored)) {
-    ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
-    ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_sidecar(text, sidecar.string()));
-  }
+  if (!std::filesystem::exists(sidecar, ignored)) return file;
+  ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
+  ORBITFUSE_ASSIGN(const ThermalScaleTag beside, thermal_scale_of_sidecar(text, sidecar.string()));
+  if (file.tag && *file.tag != beside)
+    file.two_scales = fmt::format(
+        "its own tag says {:g} K a count from {:g} K on, {} {:g} K from {:g} K on, which is passed "
+        "over: delete the one that is wrong",
+        file.tag->scale, file.tag->offset, sidecar.filename().string(), beside.scale,
+        beside.offset);
+  if (!file.tag) file.tag = beside;
   return file;
 }
 

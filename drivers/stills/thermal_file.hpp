@@ -29,6 +29,7 @@ struct ThermalFile {
   std::optional<FlirImage> flir;
   std::optional<DjiImage> dji;         ///< samples16: never temperatures unless the user says how
   std::optional<ThermalScaleTag> tag;  ///< from the file or its sidecar
+  std::string two_scales;              ///< what to say where these two differ
   double transparent = 0;              ///< as of StillPhoto
   std::string other_pages;             ///< likewise; of the first page
   /// As EXIF had it; samples and image here are turned upright by it.

@@ -171,10 +171,10 @@ Result<std::vector<PosedView>> best_beside(const OrbitRefinement& painted,
 }
 
 /// A view that neither scene places goes to the one of the two places where its image is most like
-/// what the others paint.
-Status leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& painted,
-                      const cv::Mat& image, bool agree, const PosedView& by_temperatures,
-                      double median_correlation, RenderAlignedView& view) {
+/// what the others paint. Whether it moved.
+Result<bool> leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& painted,
+                            const cv::Mat& image, bool agree, const PosedView& by_temperatures,
+                            double median_correlation, RenderAlignedView& view) {
   ORBITFUSE_ASSIGN(const auto here, correlation_with(painted, image, view.view));
   ORBITFUSE_ASSIGN(const auto there, correlation_with(painted, image, by_temperatures));
   const double like_here = share_of_median(here.value_or(0), median_correlation),
@@ -188,11 +188,13 @@ Status leave_unplaced(const OrbitRefinement& refinement, const SceneRenderer& pa
                    view.view.name, like_here, like_there)});
   view.verdict = verdict_of_unplaced(agree, apart, std::max(like_here, like_there));
   const bool like_enough = view.verdict.on_probation || like_there >= like_correlation_share;
-  if (view.verdict.confidence == Confidence::doubtful && like_enough && like_there > like_here) {
+  const bool moves =
+      view.verdict.confidence == Confidence::doubtful && like_enough && like_there > like_here;
+  if (moves) {
     view.view = by_temperatures;
     view.agreement = 0, view.matches = 0;  // form's were of the place it left
   }
-  return {};
+  return moves;
 }
 
 }  // namespace
@@ -272,8 +274,10 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
                      seen.agree ? "they agree" : "they differ")});
     const MoveDecision decision = who_places(seen);
     if (decision == MoveDecision::nobody) {
-      ORBITFUSE_TRY(leave_unplaced(refinement, renderer, orbit.images[lost[c]], seen.agree,
-                                   warm.view, found.median_correlation, view));
+      ORBITFUSE_ASSIGN(const bool moved,
+                       leave_unplaced(refinement, renderer, orbit.images[lost[c]], seen.agree,
+                                      warm.view, found.median_correlation, view));
+      if (moved) check.by_temperatures_alone.emplace_back(lost[c], view.view.cam_from_world);
       continue;
     }
     const PosedView& place = decision == MoveDecision::both                 ? form.view

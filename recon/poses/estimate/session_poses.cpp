@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "core/numeric/median.hpp"
 #include "recon/poses/frame_camera.hpp"
 
 namespace orbitfuse {
@@ -24,6 +25,38 @@ bool at_one_place(const Reconstruction& model) {
         1e-12 * std::max(cam.translation.norm(), first.translation.norm()) + 1e-12;
     return (camera_center(cam) - camera_center(first)).norm() <= rounding;
   });
+}
+
+/// Cameras that stand where no orbit's can, so much farther from the others than these from each
+/// other that the scene's size would be theirs: a slip in a file of poses. They are dropped.
+void drop_far_cameras(ModalityPoses& poses) {
+  constexpr double far_ratio = 1000;
+  std::vector<PosedView>& views = poses.reconstruction.views;
+  constexpr std::size_t least_views = 4;  // fewer have no majority to measure by
+  if (views.size() < least_views) return;
+  Eigen::Vector3d middle;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> along;
+    for (const PosedView& view : views) along.push_back(camera_center(view.cam_from_world)(axis));
+    middle(axis) = median(along);
+  }
+  std::vector<double> distances;
+  for (const PosedView& view : views)
+    distances.push_back((camera_center(view.cam_from_world) - middle).norm());
+  const double typical = median(distances);
+  if (!(typical > 0)) return;
+  std::vector<PosedView> near;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (distances[i] <= far_ratio * typical) {
+      near.push_back(std::move(views[i]));
+      continue;
+    }
+    poses.dropped.push_back(
+        {views[i].name, fmt::format("its known pose is {:.2g} times as far from the middle of the "
+                                    "others as they are: correct it",
+                                    distances[i] / typical)});
+  }
+  views = std::move(near);
 }
 
 }  // namespace
@@ -53,6 +86,7 @@ Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
                   "correct the imported poses, or set poses.use_known_poses = false (--set)");
     poses.reconstruction.views.push_back({frame->file, *camera, *frame->cam_from_world});
   }
+  drop_far_cameras(poses);
   const int posed = static_cast<int>(poses.reconstruction.views.size());
   if (posed >= 2 && at_one_place(poses.reconstruction))
     return fail(ErrorKind::input, fmt::format("known {} poses", name(modality)),

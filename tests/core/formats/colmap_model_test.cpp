@@ -117,6 +117,32 @@ TEST(ColmapText, UnknownModelAndDanglingIdsAreNamed) {
   EXPECT_FALSE(read_colmap_model(folder / "none", Modality::visible));
 }
 
+TEST(ColmapText, LinesThatCannotBeReadAreShown) {
+  const TempFolder folder;
+  const std::string camera = "1 PINHOLE 10 20 5 5 4 9\n", image = "1 1 0 0 0 1 2 3 1 a.jpg\n";
+  const auto fault = [&](const std::string& cameras, const std::string& images,
+                         const std::string& points) {
+    put(folder / "m/cameras.txt", cameras);
+    put(folder / "m/images.txt", images);
+    put(folder / "m/points3D.txt", points);
+    const auto model = read_colmap_model(folder / "m", Modality::visible);
+    return model ? "" : model.error().message();
+  };
+  EXPECT_EQ(fault(camera, image + "5 6 -1 \n", ""), "");
+  const std::string of_camera = fault("1 PINHOLE 10 wide 5 5 4 9\n", image + "\n", "");
+  EXPECT_NE(of_camera.find("cameras.txt:1: unreadable line: \"1 PINHOLE 10 wide"),
+            std::string::npos)
+      << of_camera;
+  for (const char* pixels : {"5 6 -1 7 8 nan", "5 6 -1 seven 8 -1"}) {
+    const std::string of_pixels = fault(camera, image + pixels + "\n", "");
+    EXPECT_NE(of_pixels.find(std::string("images.txt:2: unreadable line: \"") + pixels),
+              std::string::npos)
+        << of_pixels;
+  }
+  EXPECT_NE(fault(camera, image + "5 6 7\n", "7 0 0 1 9 9 9 0.5 1 0 rest\n").find("rest"),
+            std::string::npos);
+}
+
 /// Which of the two lenses is meant nobody knows, nor whose observations a point's are.
 TEST(ColmapText, NumbersThatAreThereTwiceAreNamed) {
   const TempFolder folder;

@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cmath>
 #include <opencv2/imgcodecs.hpp>
+#include <tuple>
 
 #include "tests/support/temp_folder.hpp"
 
@@ -113,6 +115,28 @@ TEST(EstimatePoses, KnownPosesReplaceTheStage) {
   ASSERT_TRUE(poses) << poses.error().message();
   ASSERT_EQ(poses->reconstruction.views.size(), 3u);
   EXPECT_EQ(poses->reconstruction.views[2].cam_from_world.translation.x(), 2.0);
+}
+
+TEST(EstimatePoses, AKnownPoseWhereNoOrbitReachesIsDroppedByName) {
+  const test::TempFolder folder;
+  PoseOptions options;
+  options.colmap = "no-colmap-on-this-path";
+  for (const auto& [count, far, kept] :
+       {std::tuple(5, 1e12, 4), {5, 200.0, 5}, {3, 1e12, 3}, {5, 1e200, 4}}) {
+    Session session = session_of(folder.path(), count);
+    for (int i = 0; i < count; ++i) {
+      Rigid3d pose;
+      pose.translation = {std::cos(i), std::sin(i), 0};
+      if (i == 1) pose.translation.z() = far;
+      session.frames[static_cast<std::size_t>(i)].camera = Camera::from_fov(160, 120, 60);
+      session.frames[static_cast<std::size_t>(i)].cam_from_world = pose;
+    }
+    const auto poses = estimate_visible_poses(session, options, folder / "work", {});
+    ASSERT_TRUE(poses) << poses.error().message();
+    EXPECT_EQ(static_cast<int>(poses->reconstruction.views.size()), kept) << count << " " << far;
+    ASSERT_EQ(static_cast<int>(poses->dropped.size()), count - kept);
+    for (const DroppedView& view : poses->dropped) EXPECT_EQ(view.name, session.frames[1].file);
+  }
 }
 
 TEST(EstimatePoses, KnownPosesAtOnePlaceAreRefusedHoweverTheyAreRounded) {

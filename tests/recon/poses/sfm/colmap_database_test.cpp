@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 #include <sqlite3.h>
+#include <sys/resource.h>
+
+#include <csignal>
 #include <fstream>
 
 #include "tests/support/temp_folder.hpp"
@@ -83,6 +86,26 @@ TEST(ColmapDatabase, FeaturesAreWrittenForTheImagesThatItHas) {
   EXPECT_EQ(keypoints->at("a.png"), keypoints->at("c.png"));
   std::ofstream(folder / "other") << "no database";
   EXPECT_FALSE(write_features(folder / "other", {{"c.png", found}}));
+}
+
+/// Files that may grow no more, as under `ulimit -f`, stand for a full disk.
+TEST(ColmapDatabase, ADiskThatTakesNoMoreIsNoForeignFile) {
+  const test::TempFolder folder;
+  make_database(folder / "db");
+  SiftFeatures many;
+  many.keypoints.resize(5000, {1.5F, 2.5F, 3.0F, 0.5F});
+  many.descriptors.setZero(5000, 128);
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit small = before;
+  small.rlim_cur = 100'000;
+  const auto handler = std::signal(SIGXFSZ, SIG_IGN);  // as the program does
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const Status written = write_features(folder / "db", {{"a.png", many}});
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
+  std::signal(SIGXFSZ, handler);
+  ASSERT_FALSE(written);
+  EXPECT_EQ(written.error().kind, ErrorKind::device) << written.error().message();
 }
 
 TEST(ColmapDatabase, OtherFilesAreNamed) {
