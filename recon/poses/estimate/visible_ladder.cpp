@@ -238,12 +238,15 @@ class VisibleLadder {
     };
     bool moved = true;
     for (int round = 0; round < most_rounds && moved; ++round) {
-      tell(3, "all matches triangulated again");
+      const std::string attempt =
+          fmt::format("all matches triangulated again{}",
+                      round == 0 ? "" : fmt::format(", round {}", round + 1));
+      tell(3, attempt);
       Reconstruction model = triangulated_again(graph, selection_.best());
       ORBITFUSE_TRY(progress_.check("poses.visible"));
       const std::string found = fmt::format("{} points", model.points.size());
-      moved = selection_.consider("all matches triangulated again", found, std::move(model),
-                                  selection_.best_level(), draws_back);
+      moved = selection_.consider(attempt, found, std::move(model), selection_.best_level(),
+                                  draws_back);
     }
     return {};
   }

@@ -92,6 +92,23 @@ TEST(RefinedTracks, AllMatchesDrawBackABlockThatStoodElsewhere) {
   EXPECT_LT(adjusted_error(model, truth), 0.3 * as_left);
 }
 
+double observations(const Reconstruction& model) {
+  double seen = 0;
+  for (const SparsePoint& point : model.points) seen += static_cast<double>(point.track.size());
+  return seen;
+}
+
+TEST(RefinedTracks, MatchesThatNoGeometryVerifiedAreTakenWhereThePlacesConfirmThem) {
+  testing_orbit::FeatureScene scene = plain_scene();
+  const PosedFrames posed = posed_frames(scene.graph, posed_by(scene.truth));
+  const double of_all = observations(triangulated(scene.graph, posed));
+  for (auto& [pair, matches] : scene.graph.verified) matches.resize(matches.size() / 3);
+  const double of_verified = observations(triangulated(scene.graph, posed));
+  EXPECT_LT(of_verified, 0.7 * of_all);
+  const Reconstruction again = triangulated_again(scene.graph, posed_by(scene.truth));
+  EXPECT_GT(observations(again), 0.95 * of_all);
+}
+
 TEST(RefinedTracks, MovesAreThoseWithinTheModelWhateverItsFrame) {
   const std::vector<PosedView> views = two_loops();
   std::vector<PosedView> elsewhere = views;
