@@ -12,24 +12,23 @@ namespace orbitfuse::planning {
 namespace {
 
 // Seconds on two cores of an Intel Xeon (Sapphire Rapids), from the traces of whole runs
-// (`run --trace`, docs/notes/planner.md); poses, new views and scores from eight scenes on an AMD
-// EPYC, 2026-11-27, by its slowness of 1.26. Depth takes two thirds of what it took there since it
-// asks fewer views (that EPYC, the same day).
+// (`run --trace`, docs/notes/planner.md); all but steps, fusion and the report from runs on an AMD
+// EPYC, 2026-11-28 (visible poses the day before), by its slowness of 1.27.
 constexpr double start_s = 0.3, known_poses_s = 0.5;
 constexpr double visible_pose_s =
     0.3;  // a view: features, matching, mapping; 0.15 to 0.45 by scene
-/// A view: search, renders, temperatures. 0.8 to 1.05 by scene; what is wrong is made good later,
+/// A view: search, renders, temperatures. 0.75 to 1.05 by scene; what is wrong is made good later,
 /// by the thermal training and the scores.
-constexpr double thermal_pose_s = 0.95;
-constexpr double depth_view_s = 0.41;  // of 400 x 300 pixels
+constexpr double thermal_pose_s = 0.88;
+constexpr double depth_view_s = 0.35;  // of 400 x 300 pixels
 constexpr double visible_step = 2.85e-3, thermal_step = 3.5e-3;
-constexpr double visible_view_s = 0.19;  // its image, its exposure, its part of the cloud
-constexpr double thermal_view_s = 0.12;
+constexpr double visible_view_s = 0.12;  // its image, its exposure, its part of the cloud
+constexpr double thermal_view_s = 0.07;
 constexpr double visible_checks_s = 0.5, thermal_checks_s = 1.1;  // of held-out views
-constexpr double new_view_mpx_s = 3.0;                            // both fields
-constexpr double lent_view_s = 0.06;  // a recorded view that lends detail; its cloud has the render
+constexpr double new_view_mpx_s = 2.7;                            // both fields
+constexpr double lent_view_s = 0.02;  // a recorded view that lends detail; its cloud has the render
 constexpr double fused_mpx_s = 0.115;  // a method
-constexpr double scored_mpx_s = 0.34, heldout_view_s = 0.25;
+constexpr double scored_mpx_s = 0.265, heldout_view_s = 0.25;
 constexpr int heldout_every = 12;
 constexpr double report_s = 0.5;
 constexpr double thermal_depth_view_s = 0.13;  // without photos: matched at 260 pixels
