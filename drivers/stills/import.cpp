@@ -155,14 +155,14 @@ class Importer {
         continue;
       }
       tell_other_pages(file->other_pages, source);
-      if (!file->two_scales.empty())
-        remarks_.add_of_file("", source.short_name(), file->two_scales);
       Result<StillPhoto> still = thermal_still(*file, decoder_, source.where());
       if (!still) {
         pass_over(still.error());
         continue;
       }
       tell_lost_samples(*still, source);
+      if (!still->two_scales.empty())
+        remarks_.add_of_file("", source.short_name(), still->two_scales);
       if (const std::string how = still->how_held(); !how.empty())
         remarks_.add_of_file("", source.short_name(), how);
       report_.has_temperatures = report_.has_temperatures || !still->frame.thermal_is_gray;

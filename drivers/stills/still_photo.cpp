@@ -132,6 +132,7 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
   still.without_temperature = converted.without_temperature;
   still.transparent = file.transparent;
   still.other_pages = file.other_pages;
+  still.two_scales = file.two_scales;
   still.orientation = file.orientation;
   still.lies_across = file.lies_across;
   still.size = file.image.size();

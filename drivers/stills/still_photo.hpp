@@ -19,7 +19,8 @@ struct StillPhoto {
   int without_temperature = 0;  ///< samples of a thermal image that none stands for
   double transparent = 0;       ///< share of the pixels whose alpha, which is dropped, says so
   std::string other_pages;      ///< of its TIFF that no frame is made of, in words
-  int orientation = 1;          ///< as of ThermalFile
+  std::string two_scales;       ///< as of ThermalFile
+  int orientation = 1;          ///< likewise
   bool lies_across = false;     ///< likewise; of a photo: beside the samples of its file
 
   /// How a thermal image is held, in words, where that is not as it is stored; else empty.

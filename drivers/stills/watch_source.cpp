@@ -254,6 +254,9 @@ void WatchSource::tell(const StillPhoto& still, const std::string& name, Frame& 
   if (const std::string how = still.how_held(); !how.empty())
     tell_once(still.lies_across ? "across" : "turned", EventKind::held,
               fmt::format("{}: {} (told of the first such file)", name, how));
+  if (!still.two_scales.empty())
+    tell_once("scales", EventKind::scale,
+              fmt::format("{}: {} (told of the first such file)", name, still.two_scales));
   if (!still.other_pages.empty())
     tell_once("pages", EventKind::ignored,
               fmt::format("{}: {} (told of the first such file)", name, still.other_pages), true);

@@ -129,6 +129,18 @@ TEST_F(WatchTest, PagesOfAnotherSizeAreTold) {
   EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
 }
 
+TEST_F(WatchTest, TwoScalesOfOneFileAreTold) {
+  options.modality = Modality::thermal;
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("1.tiff.json", R"({"scale":0.02,"offset":150})");
+  put("1.tiff", *encode_tiff(cv::Mat1w(30, 40, 29500), R"({"scale":0.01})"));
+  const Delivery photo = soon(source), told = soon(source);
+  ASSERT_EQ(photo.kind, Delivery::Kind::frame) << photo.reason;
+  EXPECT_EQ(told.reason, "scale");
+  EXPECT_THAT(told.detail, HasSubstr("1.tiff.json 0.02 K"));
+}
+
 TEST_F(WatchTest, WhatIsToldOfTheLastFileIsNotLostWhenTheRecordingEnds) {
   options.modality = Modality::thermal;
   WatchSource source(options);
