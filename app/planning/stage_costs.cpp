@@ -16,7 +16,7 @@ namespace {
 // EPYC, 2026-11-28 (visible poses the day before), by its slowness of 1.27.
 constexpr double start_s = 0.3, known_poses_s = 0.5;
 constexpr double visible_pose_s =
-    0.3;  // a view: features, matching, mapping; 0.15 to 0.45 by scene
+    0.3;  // a view: features, matching, mapping; 0.15 to 0.45 by scene, 1.4 where texture is faint
 /// A view: search, renders, temperatures. 0.75 to 1.05 by scene; what is wrong is made good later,
 /// by the thermal training and the scores.
 constexpr double thermal_pose_s = 0.88;

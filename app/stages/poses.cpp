@@ -142,9 +142,9 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 17;  // all matches triangulated again
+  stage.version = 18;  // known poses out of reach are dropped
   if (!visible) {
-    stage.version = 22;  // views on probation are no witnesses
+    stage.version = 23;  // what nobody places stays where temperatures put it
     stage.uses = {"poses_visible"};
     // Thermal views are aligned with renders of the visible field; known poses need none.
     if (!in.config->poses.use_known_poses || !all_posed(in.session->session))

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
+#include <algorithm>
 #include <fmt/format.h>
 
 #include <cmath>
@@ -120,7 +121,11 @@ Result<NewViews> choose_views(const StageContext& context, const RenderConfig& c
                            f.cam_from_world});
   if (views.views.empty())
     return fail(ErrorKind::input, config.cameras, "no frames", "list at least one camera");
-  views.described = fmt::format("{} given cameras", views.views.size());
+  const bool bent = std::any_of(
+      given.frames.begin(), given.frames.end(),
+      [](const TransformsFrame& f) { return !(f.camera == f.camera.without_distortion()); });
+  views.described = fmt::format("{} given cameras{}", views.views.size(),
+                                bent ? ", without their lens distortion" : "");
   return views;
 }
 

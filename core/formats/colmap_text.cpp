@@ -77,16 +77,18 @@ Result<std::vector<ImageRecord>> read_text_images(const std::filesystem::path& f
     }
     words >> std::ws;
     std::getline(words, image.name);  // names may hold spaces
-    if (image.name.empty() || !lines.next(line)) return unreadable(file, lines, line);
+    if (image.name.empty()) return unreadable(file, lines, line);
+    if (!lines.next(line))
+      return fail(ErrorKind::input, fmt::format("{}:{}", file.string(), lines.number()),
+                  image.name + ": no line of observations after it", "export the model again");
     std::istringstream pixels(line);
     double x, y;
     std::int64_t point;
-    while (pixels >> x) {
-      if (!(pixels >> y >> point)) return unreadable(file, lines, line);
+    while (!(pixels >> std::ws).eof()) {
+      if (!(pixels >> x >> y >> point)) return unreadable(file, lines, line);
       image.pixels.emplace_back(x, y);
       image.points.push_back(point);
     }
-    if (!pixels.eof()) return unreadable(file, lines, line);
     images.push_back(std::move(image));
   }
   return images;
@@ -110,11 +112,10 @@ Result<std::vector<PointRecord>> read_text_points(const std::filesystem::path& f
     point.rgb = {static_cast<std::uint8_t>(r), static_cast<std::uint8_t>(g),
                  static_cast<std::uint8_t>(b)};
     std::uint32_t image, index;
-    while (words >> image) {
-      if (!(words >> index)) return unreadable(file, lines, line);
+    while (!(words >> std::ws).eof()) {
+      if (!(words >> image >> index)) return unreadable(file, lines, line);
       point.track.emplace_back(image, index);
     }
-    if (!words.eof()) return unreadable(file, lines, line);
     points.push_back(std::move(point));
   }
   return points;

@@ -27,7 +27,6 @@ cv::Mat apply_orientation(const cv::Mat& image, int orientation);
 /// T[K] = scale DN + offset, from a TIFF's ImageDescription or a sidecar's text.
 struct ThermalScaleTag {
   double scale = 0.01, offset = 0;
-  bool operator==(const ThermalScaleTag&) const = default;
 };
 /// Nothing where the text names no scale (many programs write something into ImageDescription); an
 /// input error where it names one that can't be used, has a key twice, or names another count than

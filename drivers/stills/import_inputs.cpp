@@ -167,7 +167,7 @@ class Gathering {
                   fmt::format("{}; the first given is for {}", found,
                               known->second.all().front().file.string()),
                   twice.empty() ? "give the poses of these images, or none"
-                                : "give each image a name of its own, in the poses too");
+                                : "give each image one pose and a name of its own");
     remarks_.add(
         fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
     return {};

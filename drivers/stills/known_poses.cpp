@@ -28,8 +28,9 @@ Status add_transforms(const fs::path& file, std::map<Modality, KnownViews>& know
                       Remarks& remarks) {
   ORBITFUSE_ASSIGN(const Transforms transforms, read_transforms_json(file));
   for (const auto& [key, frames] : transforms.unused)
-    remarks.add(fmt::format("{}: {} of {} frames is not used: all of an image is taken",
-                            file.filename().string(), key, frames));
+    remarks.add(fmt::format("{}: {} is there in {} of {} frames and is not used{}",
+                            file.filename().string(), key, frames, transforms.frames.size(),
+                            key == "mask_path" ? ": all of an image is taken" : ""));
   for (const TransformsFrame& frame : transforms.frames) {
     known[Modality::visible].add(
         {resolve(file.parent_path(), frame.file_path), frame.camera, frame.cam_from_world, {}});
@@ -101,7 +102,8 @@ typename Map::const_iterator only_largest(const Map& values) {
 void KnownViews::add(KnownView view) {
   const std::size_t index = views_.size();
   const auto [first, is_new] = by_file_.emplace(canonical_name(view.file), index);
-  if (!is_new && !same_view(views_[first->second], view)) contradicted_.insert(first->first);
+  if (!is_new && same_view(views_[first->second], view)) return;
+  if (!is_new) contradicted_.insert(first->first);
   by_name_[view.file.filename().string()].push_back(index);
   by_stem_[view.file.stem().string()].push_back(index);
   views_.push_back(std::move(view));

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/image/exif.hpp"
@@ -32,15 +31,6 @@ std::string extension_of_bytes(const std::string& bytes) {
     default:
       return ".bmp";
   }
-}
-
-/// Of a row or a dot of pixels nothing can be made; the smallest thermal sensors have 8 x 8.
-constexpr int least_side_px = 8;
-
-Status check_size(cv::Size size, const std::string& where) {
-  if (std::min(size.width, size.height) >= least_side_px) return {};
-  return fail(ErrorKind::input, where, fmt::format("{}x{} pixels", size.width, size.height),
-              fmt::format("a frame has at least {0}x{0}: leave it out", least_side_px));
 }
 
 bool is_on_its_side(int orientation) { return orientation >= 5; }
@@ -80,7 +70,7 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where,
     still.transparent = transparent_share(bytes);
     if (image_format(bytes) == ImageFormat::tiff) still.other_pages = other_tiff_pages(bytes);
   }
-  ORBITFUSE_TRY(check_size(image.size(), where));
+  ORBITFUSE_TRY(check_frame_size(image.size(), where));
   // Before it counts as a camera of its own.
   if (image.depth() != CV_8U)
     return fail(ErrorKind::input, where,
@@ -123,7 +113,6 @@ Result<StillPhoto> still_of_video(const cv::Mat& image) {
 Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& decoder,
                                  const std::string& where) {
   StillPhoto still;
-  ORBITFUSE_TRY(check_size(file.flir ? file.flir->signal.size() : file.image.size(), where));
   ORBITFUSE_ASSIGN(const ThermalDecoder::Converted converted, decoder.convert(file, where));
   Frame& frame = still.frame;
   frame.thermal_is_gray = converted.counts.empty();

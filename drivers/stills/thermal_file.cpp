@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/image/exif.hpp"
 #include "core/image/jpeg_size.hpp"
@@ -26,6 +27,13 @@ Result<FlirImage> recorded_image(std::string_view bytes, const std::string& wher
   return read_flir_file(index < frames.size() ? frames[index] : bytes, where);
 }
 
+/// By more than numbers that were written with a few digits do.
+bool differ(const ThermalScaleTag& a, const ThermalScaleTag& b) {
+  constexpr double written = 1e-5;
+  return std::abs(a.scale - b.scale) > written * a.scale ||
+         std::abs(a.offset - b.offset) > written * std::abs(a.offset) + 1e-3;
+}
+
 bool is_upright_format(cv::Size size) { return size.height > size.width; }
 
 /// EXIF tells how the JPEG's own picture is to be held. The samples beside it lie as the sensor has
@@ -43,6 +51,15 @@ void turn_upright(FlirImage& flir, std::string_view jpeg, ThermalFile& file) {
 }
 
 }  // namespace
+
+Status check_frame_size(cv::Size size, const std::string& where) {
+  constexpr int least_side_px = 4;  // the smallest thermal sensors have 16 x 4
+  if (std::min(size.width, size.height) >= least_side_px) return {};
+  return fail(ErrorKind::input, where,
+              fmt::format("{}x{} pixels, a frame has at least {}x{}", size.width, size.height,
+                          least_side_px, least_side_px),
+              "was it cut or scaled by mistake?");
+}
 
 Result<ThermalFile> read_thermal_file(const std::filesystem::path& path, std::optional<int> page) {
   ORBITFUSE_ASSIGN(const std::string bytes, read_file(path, max_image_bytes));
@@ -64,6 +81,7 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
     file.kind = ThermalFile::Kind::radiometric_jpeg;
     ORBITFUSE_ASSIGN(file.flir,
                      recording ? recorded_image(bytes, where, page) : read_flir_jpeg(bytes, where));
+    ORBITFUSE_TRY(check_frame_size(file.flir->signal.size(), where));
     file.taken_ns = file.flir->taken_ns;
     if (!recording) turn_upright(*file.flir, bytes, file);
     return file;
@@ -78,6 +96,7 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
   } else {
     ORBITFUSE_ASSIGN(file.image, decode_image(bytes, where));
   }
+  ORBITFUSE_TRY(check_frame_size(file.image.size(), where));
   const ExifInfo exif = read_exif(bytes);
   file.taken_ns = exif.taken_ns;
   file.orientation = exif.orientation;
@@ -114,14 +133,19 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
   std::error_code ignored;
   if (!std::filesystem::exists(sidecar, ignored)) return file;
   ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
-  ORBITFUSE_ASSIGN(const ThermalScaleTag beside, thermal_scale_of_sidecar(text, sidecar.string()));
-  if (file.tag && *file.tag != beside)
+  const auto beside = thermal_scale_of_sidecar(text, sidecar.string());
+  if (!file.tag && !beside) return tl::unexpected(beside.error());
+  if (!file.tag)
+    file.tag = *beside;
+  else if (!beside)
+    file.two_scales = fmt::format("it has a scale of its own; its sidecar is passed over ({})",
+                                  beside.error().found);
+  else if (differ(*file.tag, *beside))
     file.two_scales = fmt::format(
         "its own tag says {:g} K a count from {:g} K on, {} {:g} K from {:g} K on, which is passed "
         "over: delete the one that is wrong",
-        file.tag->scale, file.tag->offset, sidecar.filename().string(), beside.scale,
-        beside.offset);
-  if (!file.tag) file.tag = beside;
+        file.tag->scale, file.tag->offset, sidecar.filename().string(), beside->scale,
+        beside->offset);
   return file;
 }
 

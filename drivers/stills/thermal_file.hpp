@@ -38,6 +38,9 @@ struct ThermalFile {
   const char* float_unit = nullptr;  ///< samples16 that were floats: what these were taken for
 };
 
+/// Of a row or a dot of pixels no frame can be made. Input error.
+Status check_frame_size(cv::Size size, const std::string& where);
+
 /// Without a page the file must hold a single image.
 Result<ThermalFile> read_thermal_file(const std::filesystem::path& file,
                                       std::optional<int> page = {});

@@ -43,8 +43,10 @@ void drop_far_cameras(ModalityPoses& poses) {
   std::vector<double> distances;
   for (const PosedView& view : views)
     distances.push_back((camera_center(view.cam_from_world) - middle).norm());
-  const double typical = median(distances);
-  if (!(typical > 0)) return;
+  // Not the median: half of the cameras may be a tripod's, and the others the orbit.
+  std::vector<double> ordered = distances;
+  const double typical = quantile(ordered, 0.75);
+  if (!(typical > 1e-12 * middle.norm())) return;
   std::vector<PosedView> near;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (distances[i] <= far_ratio * typical) {

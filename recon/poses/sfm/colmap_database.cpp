@@ -74,10 +74,10 @@ class Database {
       while ((status = sqlite3_step(prepared)) == SQLITE_ROW) row(prepared);
     }
     if (status == SQLITE_DONE) return {};
-    if (status == SQLITE_IOERR || status == SQLITE_FULL)
-      return fail(
-          ErrorKind::device, path_.string(), sqlite3_errmsg(handle_.get()),
-          "free disk space, or raise the limit of a file's size (ulimit -f), and run again");
+    if (status == SQLITE_IOERR || status == SQLITE_FULL || status == SQLITE_READONLY)
+      return fail(ErrorKind::device, path_.string(), sqlite3_errmsg(handle_.get()),
+                  "see that the disk works, has room and may be written to (and the limit of a "
+                  "file's size, ulimit -f), and run again");
     return fail(ErrorKind::input, path_.string(),
                 fmt::format("not a COLMAP database ({})", sqlite3_errmsg(handle_.get())),
                 "delete it and run the pose stage again");

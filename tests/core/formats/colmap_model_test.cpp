@@ -133,12 +133,16 @@ TEST(ColmapText, LinesThatCannotBeReadAreShown) {
   EXPECT_NE(of_camera.find("cameras.txt:1: unreadable line: \"1 PINHOLE 10 wide"),
             std::string::npos)
       << of_camera;
-  for (const char* pixels : {"5 6 -1 7 8 nan", "5 6 -1 seven 8 -1"}) {
+  for (const char* pixels :
+       {"5 6 -1 7 8 nan", "5 6 -1 seven 8 -1", "5 6 -1 1e999", "5 6 -1 7e", "5 6 -1 -"}) {
     const std::string of_pixels = fault(camera, image + pixels + "\n", "");
     EXPECT_NE(of_pixels.find(std::string("images.txt:2: unreadable line: \"") + pixels),
               std::string::npos)
         << of_pixels;
   }
+  EXPECT_NE(fault(camera, image, "").find("a.jpg: no line of observations"), std::string::npos);
+  EXPECT_NE(fault(camera, image + "5 6 7\n", "7 0 0 1 9 9 9 0.5 1 0 99999999999\n").find("9999"),
+            std::string::npos);
   EXPECT_NE(fault(camera, image + "5 6 7\n", "7 0 0 1 9 9 9 0.5 1 0 rest\n").find("rest"),
             std::string::npos);
 }

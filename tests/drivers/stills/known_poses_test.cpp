@@ -45,6 +45,14 @@ TEST_F(KnownPoses, AnImageThatIsThereTwiceWithOnePoseIsOneFrame) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->visible, 2);
   EXPECT_EQ(report->with_pose, 2);
+  EXPECT_THAT(report->warnings, test::none_says("the same image as"));
+  // Found by name too, where the images lie elsewhere.
+  std::filesystem::rename(folder / "in", folder / "elsewhere");
+  std::filesystem::remove_all(folder / "session");
+  options.visible = {folder / "elsewhere"};
+  const auto by_name = import();
+  ASSERT_TRUE(by_name) << by_name.error().message();
+  EXPECT_EQ(by_name->with_pose, 2);
 }
 
 TEST_F(KnownPoses, MasksAndDepthsThatNothingUsesAreTold) {
@@ -58,7 +66,8 @@ TEST_F(KnownPoses, MasksAndDepthsThatNothingUsesAreTold) {
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->with_pose, 2);
-  EXPECT_THAT(report->warnings, test::one_says("transforms.json: mask_path of 1 frames"));
+  EXPECT_THAT(report->warnings,
+              test::one_says("transforms.json: mask_path is there in 1 of 2 frames"));
   EXPECT_THAT(report->warnings, test::none_says("depth_file_path"));
 }
 

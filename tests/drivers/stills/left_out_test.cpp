@@ -106,7 +106,7 @@ TEST_F(LeftOut, DotsAndRowsOfPixelsAreNoFrames) {
   put("in/dot.png", *encode_png(cv::Mat(1, 1, CV_8UC3, cv::Scalar(1, 2, 3))));
   put("in/row.png", *encode_png(cv::Mat(1, 40, CV_8UC3, cv::Scalar(1, 2, 3))));
   put_counts("t/a.tif", 29000, 30000, 1);
-  put("t/b.tif", *encode_tiff(cv::Mat(30, 7, CV_16UC1, cv::Scalar(29000)), ""));
+  put("t/b.tif", *encode_tiff(cv::Mat(30, 3, CV_16UC1, cv::Scalar(29000)), ""));
   options.visible = {folder / "in"};
   options.thermal = {folder / "t"};
   const auto report = import();
@@ -115,7 +115,7 @@ TEST_F(LeftOut, DotsAndRowsOfPixelsAreNoFrames) {
   EXPECT_EQ(report->thermal, 1);
   EXPECT_THAT(report->warnings, test::one_says("left out", "row.png", "40x1 pixels"));
   EXPECT_THAT(report->warnings, test::one_says("left out", "dot.png", "1x1 pixels"));
-  EXPECT_THAT(report->warnings, test::one_says("left out", "b.tif", "7x30 pixels"));
+  EXPECT_THAT(report->warnings, test::one_says("left out", "b.tif", "3x30 pixels"));
 }
 
 TEST_F(LeftOut, AFolderOfFramesAndOfTrackingFramesIsGivenTwice) {

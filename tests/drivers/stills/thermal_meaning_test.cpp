@@ -140,13 +140,18 @@ TEST_F(ThermalMeaning, TwoScalesThatDifferAreTold) {
   cv::Mat image(30, 40, CV_16UC1);
   cv::RNG(8).fill(image, cv::RNG::UNIFORM, 7000, 7400);
   put("in/a.tiff", *encode_tiff(image, R"({"scale":0.04,"unit":"K"})"));
-  put("in/a.tiff.json", R"({"scale":0.04,"offset":0})");
-  EXPECT_THAT(import().warnings, test::none_says("a.tiff.json")) << "both say the same";
-  put("in/a.tiff.json", R"({"scale":0.02,"offset":150})");
-  const ImportReport report = import();
-  EXPECT_THAT(report.warnings,
+  const auto warnings_with = [&](const char* sidecar) {
+    put("in/a.tiff.json", sidecar);
+    const ImportReport report = import();
+    EXPECT_NEAR(kelvin_of(report, 0).at<float>(0, 0), 0.04 * image.at<std::uint16_t>(0, 0), 0.01);
+    return report.warnings;
+  };
+  EXPECT_THAT(warnings_with(R"({"scale":0.04,"offset":0})"), test::none_says("a.tiff"));
+  EXPECT_THAT(warnings_with(R"({"scale":0.0400001,"offset":0})"), test::none_says("a.tiff"));
+  EXPECT_THAT(warnings_with(R"({"scale":0.02,"offset":150})"),
               test::one_says("a.tiff", "0.04 K a count", "a.tiff.json 0.02 K", "passed over"));
-  EXPECT_NEAR(kelvin_of(report, 0).at<float>(0, 0), 0.04 * image.at<std::uint16_t>(0, 0), 0.01);
+  EXPECT_THAT(warnings_with(R"({"format":"of another program"})"),
+              test::one_says("a.tiff", "a scale of its own"));
 }
 
 TEST_F(ThermalMeaning, FloatsThatAreNoTemperaturesAreRefused) {

@@ -88,22 +88,36 @@ TEST(ColmapDatabase, FeaturesAreWrittenForTheImagesThatItHas) {
   EXPECT_FALSE(write_features(folder / "other", {{"c.png", found}}));
 }
 
-/// Files that may grow no more, as under `ulimit -f`, stand for a full disk.
+/// Files may not grow beyond that meanwhile, as under `ulimit -f`.
+class SmallFiles {
+ public:
+  explicit SmallFiles(rlim_t bytes) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit small{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~SmallFiles() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+  SmallFiles(const SmallFiles&) = delete;
+  SmallFiles& operator=(const SmallFiles&) = delete;
+
+ private:
+  void (*handler_)(int) = std::signal(SIGXFSZ, SIG_IGN);  // as the program does
+  rlimit before_{};
+};
+
 TEST(ColmapDatabase, ADiskThatTakesNoMoreIsNoForeignFile) {
   const test::TempFolder folder;
   make_database(folder / "db");
   SiftFeatures many;
   many.keypoints.resize(5000, {1.5F, 2.5F, 3.0F, 0.5F});
   many.descriptors.setZero(5000, 128);
-  rlimit before{};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  rlimit small = before;
-  small.rlim_cur = 100'000;
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);  // as the program does
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-  const Status written = write_features(folder / "db", {{"a.png", many}});
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-  std::signal(SIGXFSZ, handler);
+  const Status written = [&] {
+    const SmallFiles only(100'000);
+    return write_features(folder / "db", {{"a.png", many}});
+  }();
   ASSERT_FALSE(written);
   EXPECT_EQ(written.error().kind, ErrorKind::device) << written.error().message();
 }
