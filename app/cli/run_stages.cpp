@@ -133,6 +133,7 @@ class StagedRun {
 
  private:
   Status look_for_other_results();
+  void take_cameras_of_run();
   void before_stage(pipeline::Stage& stage, const std::vector<StageStatus>& finished);
   Status record(const pipeline::RunSummary& summary, const json& list);
   void warn_of_overrun() const;
@@ -177,6 +178,7 @@ Status StagedRun::open(const std::vector<std::string>& targets) {
   for (const std::string& warning : input_.session.warnings) context_.console.warning(warning);
   session_ = fs::absolute(folders_.session).lexically_normal().string();
   ORBITFUSE_TRY(look_for_other_results());
+  take_cameras_of_run();
   if (missing_ == Missing::leave_out &&
       pipeline::finished_stages(folders_.out, stages::stage_names()).empty())
     return fail(
@@ -241,6 +243,17 @@ Status StagedRun::look_for_other_results() {
   return {};
 }
 
+/// Views that were rendered from given cameras stay those until other ones are asked for: the next
+/// verb must not render the usual ones over them.
+void StagedRun::take_cameras_of_run() {
+  std::string& cameras = context_.config.render.cameras;
+  const json before = earlier_run(folders_.out).value_or(json());
+  const bool others = context_.given.contains("render.path");
+  if (!cameras.empty() || others || replaces_ || !is_of(before, input_.session)) return;
+  if (const auto file = before.find("cameras"); file != before.end() && file->is_string())
+    cameras = file->get<std::string>();
+}
+
 /// What a step of another recipe takes was never measured: its time has to be given.
 Status check_recipes(const stages::RunConfig& config) {
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
@@ -303,10 +316,12 @@ Status StagedRun::record(const pipeline::RunSummary& summary, const json& list) 
               {"seed", context_.config.seed},
               {"stages", list}};
   if (!planned_.is_null()) run["planned"] = planned_;
+  if (const std::string& cameras = context_.config.render.cameras; !cameras.empty())
+    run["cameras"] = fs::absolute(cameras).lexically_normal().string();
   if (summary.error && !keeps_options(summary.error->kind)) {
     const json before = earlier_run(folders_.out).value_or(json());
     const bool known = is_of(before, input_.session);
-    for (const char* key : {"config", "seed", "planned"}) {
+    for (const char* key : {"config", "seed", "planned", "cameras"}) {
       if (known && before.contains(key))
         run[key] = before[key];
       else

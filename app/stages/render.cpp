@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
-#include <algorithm>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -277,9 +277,10 @@ pipeline::Stage render_stage(const StageInputs& in) {
   stage.version = 6;  // detail is tried on the middle half of recorded views
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
-  stage.options["cameras"] = in.config->render.cameras;
-  if (!in.config->render.cameras.empty())
-    stage.inputs_hash = file_hash(in.config->render.cameras).value_or("missing");
+  const std::string& cameras = in.config->render.cameras;
+  stage.options["cameras"] =
+      cameras.empty() ? "" : std::filesystem::absolute(cameras).lexically_normal().string();
+  if (!cameras.empty()) stage.inputs_hash = file_hash(cameras).value_or("missing");
   stage.absent = [](const StageContext& context) -> std::optional<std::string> {
     if (context.has("train_visible") || context.has("train_thermal")) return std::nullopt;
     return "no field was trained";

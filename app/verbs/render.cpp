@@ -20,7 +20,8 @@ Action add_render(CLI::App& app) {
   const auto options = std::make_shared<RenderArguments>();
   add_folders(app, options->folders);
   app.add_option("--cameras", options->cameras,
-                 "transforms.json with the views, in the visible frame");
+                 "transforms.json with the views, in the visible frame; later verbs keep them "
+                 "(--path: no more)");
   app.add_option("--path", options->path, "Where new cameras stand (render.path)")
       ->check(CLI::IsMember({"auto", "orbit", "path"}));
   app.add_option("--views", options->views, "New cameras (render.views)");
@@ -39,6 +40,8 @@ Action add_render(CLI::App& app) {
     if (!options->path.empty()) ORBITFUSE_TRY(settings.apply("render.path=" + options->path));
     if (options->views) context.config.render.path.views = *options->views;
     if (options->width) context.config.render.path.width_px = *options->width;
+    if (!options->path.empty() || options->views || options->width)
+      context.given.insert("render.path");  // no longer an earlier call's --cameras
     ORBITFUSE_TRY(context.config.validate().map_error([&](Error error) {
       if (options->views) error = as_typed(error, {{"render.views", "--views"}});
       if (options->width) error = as_typed(error, {{"render.width_px", "--width"}});

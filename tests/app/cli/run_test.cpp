@@ -313,7 +313,13 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   ASSERT_TRUE(image);
   EXPECT_EQ(image->cols, 40);
   EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
+  // Whatever comes after keeps them, a failed call too, until other views are asked for.
   EXPECT_EQ(run({"--cameras", "/none.json"}, {}, "render").code, 3);
+  ASSERT_EQ(run({}, {}, "fuse").code, 0);
+  EXPECT_EQ(read_visible(out / "render/visible/000.png")->cols, 40);
+  EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
+  ASSERT_EQ(run({"--views", "2"}, {}, "render").code, 0);
+  EXPECT_TRUE(fs::exists(out / "render/visible/001.png"));
   cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(1000000, 1000000);
   ASSERT_TRUE(write_transforms_json(temp.path() / "huge.json", *cameras));
   const Outcome huge = run({"--cameras", (temp.path() / "huge.json").string()}, {}, "render");
