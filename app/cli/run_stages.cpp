@@ -247,9 +247,9 @@ Status StagedRun::look_for_other_results() {
 /// verb must not render the usual ones over them.
 void StagedRun::take_cameras_of_run() {
   std::string& cameras = context_.config.render.cameras;
+  if (!cameras.empty() || context_.given.contains("render.path") || replaces_) return;
   const json before = earlier_run(folders_.out).value_or(json());
-  const bool others = context_.given.contains("render.path");
-  if (!cameras.empty() || others || replaces_ || !is_of(before, input_.session)) return;
+  if (!is_of(before, input_.session)) return;
   if (const auto file = before.find("cameras"); file != before.end() && file->is_string())
     cameras = file->get<std::string>();
 }

@@ -29,7 +29,7 @@ Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
 struct TemperatureCheck {
   int moved = 0;
   int undecided = 0;  ///< contradicted, where that were most of the views
-  /// Views that form would pull away from where temperatures are sure they are.
+  /// Views that form would pull away from where temperatures have them.
   std::vector<std::pair<std::size_t, Rigid3d>> by_temperatures_alone;
 };
 

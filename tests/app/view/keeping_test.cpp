@@ -2,10 +2,8 @@
 // What a viewer keeps in the run's folder, and the way of its camera along kept views.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include <cmath>
-#include <csignal>
 #include <limits>
 #include <optional>
 #include <thread>
@@ -14,6 +12,7 @@
 #include "app/view/film.hpp"
 #include "core/image/image_io.hpp"
 #include "tests/app/view/toy_run.hpp"
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::view {
@@ -174,15 +173,13 @@ TEST_F(FilmTest, Mp4IsAFilm) {
 /// As on a full disk: no file may grow beyond some bytes.
 TEST_F(FilmTest, Mp4ThatCannotBeWrittenIsNotMade) {
   order.kind = FilmKind::mp4;
-  struct rlimit before {};
-  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
-  const auto handler = std::signal(SIGXFSZ, SIG_IGN);
-  const struct rlimit small { 200, before.rlim_max };
-  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
-  const Status begun = films.begin(order, views);
-  const json state = finished();
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, handler);
+  Status begun;
+  json state;
+  {
+    const orbitfuse::test::FileSizeLimit full(200);
+    begun = films.begin(order, views);
+    state = finished();
+  }
   ASSERT_TRUE(begun);
   EXPECT_FALSE(state.contains("file")) << state;
   EXPECT_TRUE(state.contains("error")) << state;

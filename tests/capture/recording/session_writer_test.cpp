@@ -3,17 +3,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <signal.h>
-#include <sys/resource.h>
 
 #include <functional>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "capture/recording/raw_counts.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/capture/scripted_source.hpp"
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/refused_locks.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -213,17 +213,14 @@ TEST(SessionWriter, FullDiskKeepsEveryAcknowledgedFrame) {
   auto writer = *SessionWriter::create(folder / "s");
   ASSERT_TRUE(writer->add_device(thermal_device()));
   ASSERT_TRUE(writer->append("thermal0", thermal_frame(0)));
-  signal(SIGXFSZ, SIG_IGN);
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
   // First too small for an image, then so small that the manifest line is cut.
   const rlim_t manifest_size = std::filesystem::file_size(folder / "s/manifest.jsonl");
   for (const rlim_t bytes : {rlim_t{200}, manifest_size + 40}) {
-    const rlimit limit{bytes, before.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-    const Status gap = writer->append(GapRecord{"thermal0", 1, 1, std::string(80, 'x')});
-    const auto record = writer->append("thermal0", thermal_frame(1));
-    setrlimit(RLIMIT_FSIZE, &before);
+    const auto [gap, record] = [&] {
+      const test::FileSizeLimit full(bytes);
+      Status refused = writer->append(GapRecord{"thermal0", 1, 1, std::string(80, 'x')});
+      return std::pair(std::move(refused), writer->append("thermal0", thermal_frame(1)));
+    }();
     ASSERT_FALSE(record);
     EXPECT_EQ(record.error().kind, ErrorKind::device);
     ASSERT_FALSE(gap);

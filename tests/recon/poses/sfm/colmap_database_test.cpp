@@ -3,11 +3,10 @@
 
 #include <gtest/gtest.h>
 #include <sqlite3.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <fstream>
 
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -88,26 +87,6 @@ TEST(ColmapDatabase, FeaturesAreWrittenForTheImagesThatItHas) {
   EXPECT_FALSE(write_features(folder / "other", {{"c.png", found}}));
 }
 
-/// Files may not grow beyond that meanwhile, as under `ulimit -f`.
-class SmallFiles {
- public:
-  explicit SmallFiles(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit small{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &small);
-  }
-  ~SmallFiles() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-  SmallFiles(const SmallFiles&) = delete;
-  SmallFiles& operator=(const SmallFiles&) = delete;
-
- private:
-  void (*handler_)(int) = std::signal(SIGXFSZ, SIG_IGN);  // as the program does
-  rlimit before_{};
-};
-
 TEST(ColmapDatabase, ADiskThatTakesNoMoreIsNoForeignFile) {
   const test::TempFolder folder;
   make_database(folder / "db");
@@ -115,7 +94,7 @@ TEST(ColmapDatabase, ADiskThatTakesNoMoreIsNoForeignFile) {
   many.keypoints.resize(5000, {1.5F, 2.5F, 3.0F, 0.5F});
   many.descriptors.setZero(5000, 128);
   const Status written = [&] {
-    const SmallFiles only(100'000);
+    const test::FileSizeLimit full(100'000);
     return write_features(folder / "db", {{"a.png", many}});
   }();
   ASSERT_FALSE(written);
