@@ -142,12 +142,13 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 18;  // known poses out of reach are dropped
+  stage.version = 19;  // known poses are held against the photos
   if (!visible) {
-    stage.version = 23;  // what nobody places stays where temperatures put it
+    stage.version = 24;  // known poses are held against the visible scene
     stage.uses = {"poses_visible"};
-    // Thermal views are aligned with renders of the visible field; known poses need none.
-    if (!in.config->poses.use_known_poses || !all_posed(in.session->session))
+    // Thermal views are aligned with renders of the visible field, known poses held against them.
+    const PoseOptions& poses = in.config->poses;
+    if (!poses.use_known_poses || poses.check_known_poses || !all_posed(in.session->session))
       stage.uses.push_back("train_visible");
   }
   stage.options = in.config->settings().to_json("poses");

@@ -69,6 +69,8 @@ void add_poses(Settings& settings, PoseOptions& poses) {
   settings.add("poses.colmap", poses.colmap, "COLMAP's command");
   settings.add("poses.use_known_poses", poses.use_known_poses,
                "Poses that the session carries replace the estimate");
+  settings.add("poses.check_known_poses", poses.check_known_poses,
+               "Such poses are held against the images first");
   settings.add("poses.use_tracking_frames", poses.use_tracking_frames,
                "Thermal frames recorded between stations tie neighbours together");
   settings.add("poses.max_image_side_px", poses.max_image_side_px,

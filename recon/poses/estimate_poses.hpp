@@ -25,6 +25,9 @@ struct PoseOptions {
   std::string colmap = "colmap";
   /// Poses that the session already carries (transforms.json, ground truth) replace the stage.
   bool use_known_poses = true;
+  /// They are held against the images first: poses of other images or of another lens would spoil
+  /// all that follows without a word.
+  bool check_known_poses = true;
   /// Thermal frames recorded between stations tie neighbouring stations together.
   bool use_tracking_frames = true;
   std::uint64_t seed = 1;
@@ -100,16 +103,16 @@ struct VisibleScene {
   SceneRenderer renderer;  ///< of its trained field; without it only a rig places thermal views
 };
 
-/// Visible views: known poses, else COLMAP with orbit-limited pairs and ever more relaxed
-/// settings, then bundle adjustment. World frame: z up, origin at the point the cameras look at,
-/// median camera distance 1 (unless poses are known: then theirs).
+/// Visible views: known poses that the photos don't contradict, else COLMAP with orbit-limited pairs
+/// and ever more relaxed settings, then bundle adjustment. World frame: z up, origin at the point the
+/// cameras look at, median camera distance 1 (unless poses are known: then theirs).
 /// `workdir`: a folder to write in, made where it isn't there; below it "visible" (thermal views:
 /// "thermal") is written over, and holds reduced images, COLMAP's database, models and log
 /// afterwards, of failures too. Nothing reads them again: the caller may remove them. Not touched
 /// where no structure from motion runs.
 /// Errors: usage (options), input (no or one frame, unreadable file), device (`workdir` can't be
 /// written), unavailable (no COLMAP and no known poses), quality (no attempt held; the message
-/// lists each attempt and why), cancelled.
+/// lists each attempt and why; or the photos contradict the known poses as a whole), cancelled.
 Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseOptions& options,
                                              const std::filesystem::path& workdir,
                                              const Progress& progress);

@@ -7,15 +7,13 @@
 #include <cmath>
 #include <limits>
 
-#include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
 #include "recon/alignment/edge_field.hpp"
-#include "recon/alignment/keyframe_scene.hpp"
-#include "recon/alignment/luminance.hpp"
 #include "recon/poses/cross_modal/edge_lines.hpp"
 #include "recon/poses/cross_modal/orbit_frames.hpp"
 #include "recon/poses/cross_modal/orbit_selection.hpp"
+#include "recon/poses/cross_modal/scene_views.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
 #include "recon/poses/cross_modal/view_recovery.hpp"
 #include "recon/poses/cross_modal/view_verdicts.hpp"
@@ -34,15 +32,6 @@ constexpr double min_sure_ratio = 0.5;
 constexpr double undecided_lead = 1, sure_lead = 2;
 /// Below, the search leaves more to renders.
 constexpr std::size_t few_views = 16;
-/// Visible views that the scene is first rendered at: more would show the same from nearer by.
-constexpr int max_keyframes = 36;
-
-/// As a lens without distortion would have seen it: edges are compared with straight renders.
-Result<cv::Mat> straight_luminance(const Session& session, const FrameRecord& frame,
-                                   const Camera& lens) {
-  ORBITFUSE_ASSIGN(const cv::Mat values, read_luminance(session, frame));
-  return recorded_straight(without_glare(values), lens, frame.file);
-}
 
 /// Thermal stations and what they are looked for in.
 struct OrbitWork {
@@ -163,20 +152,6 @@ std::string words(const SelectedOrbit& selected) {
           fmt::format("; start at {:.0f} deg{}, distance {:.2f}: support {:.1f}", one.offset_deg,
                       one.mirrored ? " clockwise" : "", one.radius, one.support);
   return text;
-}
-
-/// The scene for alignment: most of its views are made of a few renders.
-Result<SceneRenderer> scene_of(const VisibleScene& visible,
-                               const Similarity3d& canonical_from_visible,
-                               const Progress& progress) {
-  const TraceSpan span("keyframes of the visible field");
-  std::vector<PosedView> views;
-  const auto count = static_cast<int>(visible.reconstruction.views.size());
-  const int kept = std::min(count, max_keyframes);
-  for (int i = 0; i < kept; ++i)
-    views.push_back(visible.reconstruction.views[static_cast<std::size_t>(i * count / kept)]);
-  const Eigen::Vector3d center = canonical_from_visible.inverse() * Eigen::Vector3d::Zero();
-  return keyframe_scene(visible.renderer, views, center, {}, progress);
 }
 
 std::string loops_in_doubt(const std::vector<int>& loops) {

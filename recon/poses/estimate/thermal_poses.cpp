@@ -4,30 +4,24 @@
 #include <fmt/format.h>
 
 #include "recon/poses/cross_modal/cross_modal.hpp"
-#include "recon/poses/estimate/session_poses.hpp"
+#include "recon/poses/known/known_poses.hpp"
+#include "recon/poses/known/scene_check.hpp"
 #include "recon/poses/rig/rig_poses.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
 
 namespace orbitfuse {
 
-Result<ThermalPoses> estimate_thermal_poses(const Session& session, const VisibleScene* visible,
-                                            const PoseOptions& options,
-                                            const std::filesystem::path& workdir,
-                                            const Progress& progress) {
-  ORBITFUSE_TRY(options.validate());
-  ORBITFUSE_TRY(progress.check("poses.thermal"));
-  if (options.use_known_poses && has_known_poses(session, Modality::thermal)) {
-    ORBITFUSE_ASSIGN(ModalityPoses poses, known_poses(session, Modality::thermal));
-    // Known poses of a session share one world; estimated visible ones do not live in it.
-    const bool shares = visible != nullptr && has_known_poses(session, Modality::visible);
-    return ThermalPoses{std::move(poses), shares};
-  }
+namespace {
+
+/// From the images; `steps` holds what was tried before.
+Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visible,
+                               const PoseOptions& options, const std::filesystem::path& workdir,
+                               const Progress& progress, std::vector<LadderStep> steps) {
   const auto frames = session.frames_of(Modality::thermal, options.use_tracking_frames);
   if (frames.size() < 2)
     return fail(ErrorKind::input, session.folder.string(),
                 fmt::format("{} thermal frames, at least 2 are needed", frames.size()),
                 "record or import more views");
-  std::vector<LadderStep> steps;
   if (visible != nullptr) {
     const RigPairs rig = find_rig_pairs(session);
     if (rig.declared && rig.pairs.empty())
@@ -63,6 +57,37 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   ModalityPoses poses = *std::move(alone);
   poses.ladder = std::move(steps);
   return ThermalPoses{std::move(poses), false};
+}
+
+}  // namespace
+
+Result<ThermalPoses> estimate_thermal_poses(const Session& session, const VisibleScene* visible,
+                                            const PoseOptions& options,
+                                            const std::filesystem::path& workdir,
+                                            const Progress& progress) {
+  ORBITFUSE_TRY(options.validate());
+  ORBITFUSE_TRY(progress.check("poses.thermal"));
+  if (!options.use_known_poses || !has_known_poses(session, Modality::thermal))
+    return estimated(session, visible, options, workdir, progress, {});
+  ORBITFUSE_ASSIGN(ModalityPoses known, known_poses(session, Modality::thermal));
+  // Known poses of a session share one world; estimated visible ones do not live in it.
+  const bool shares = visible != nullptr && has_known_poses(session, Modality::visible);
+  if (!shares || !options.check_known_poses) return ThermalPoses{std::move(known), shares};
+  ORBITFUSE_ASSIGN(const std::optional<Contradiction> contradiction,
+                   check_by_scene(session, *visible, progress, known));
+  if (!contradiction) return ThermalPoses{std::move(known), shares};
+  LadderStep step = known.ladder.back();
+  step.held = false, step.why = contradiction->words;
+  ORBITFUSE_ASSIGN(ThermalPoses poses, estimated(without_known_poses(session, Modality::thermal,
+                                                                     contradiction->true_focal),
+                                                 visible, options, workdir, progress, {step}));
+  poses.warnings.insert(
+      poses.warnings.begin(),
+      fmt::format("the known thermal poses contradict the visible scene and were estimated from "
+                  "the images instead: {}; correct them, or set poses.check_known_poses = false "
+                  "to take them as they are",
+                  contradiction->words));
+  return poses;
 }
 
 std::string described_rig(const Session& session) {

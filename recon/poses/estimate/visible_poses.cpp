@@ -3,7 +3,8 @@
 
 #include <fmt/format.h>
 
-#include "recon/poses/estimate/session_poses.hpp"
+#include "recon/poses/known/known_poses.hpp"
+#include "recon/poses/known/photo_check.hpp"
 #include "recon/poses/estimate/visible_ladder.hpp"
 
 namespace orbitfuse {
@@ -13,8 +14,12 @@ Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseO
                                              const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(progress.check("poses.visible"));
-  if (options.use_known_poses && has_known_poses(session, Modality::visible))
-    return known_poses(session, Modality::visible);
+  if (options.use_known_poses && has_known_poses(session, Modality::visible)) {
+    ORBITFUSE_ASSIGN(ModalityPoses known, known_poses(session, Modality::visible));
+    if (options.check_known_poses)
+      ORBITFUSE_TRY(check_by_photos(session, options, workdir / "visible", progress, known));
+    return known;
+  }
   const auto frames = session.frames_of(Modality::visible, options.use_tracking_frames);
   if (frames.size() < 2)
     return fail(ErrorKind::input, session.folder.string(),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/estimate/session_poses.hpp"
+#include "recon/poses/known/known_poses.hpp"
 
 #include <fmt/format.h>
 
@@ -102,6 +102,24 @@ Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
                          fmt::format("the session carries {} poses", posed),
                          "no structure from motion; poses are as trusted as their source"});
   return poses;
+}
+
+Session without_known_poses(Session session, Modality modality, double true_focal) {
+  constexpr double told_sigma = 0.05;
+  for (FrameRecord& frame : session.frames) {
+    if (frame.modality != modality) continue;
+    const std::optional<Camera> camera = known_camera(session, frame);
+    for (DeviceInfo& device : session.devices)
+      if (device.id == frame.device && camera && !device.lens.focal_px) {
+        device.lens.focal_px = true_focal * camera->fx;
+        device.lens.focal_relative_sigma = told_sigma;
+      }
+    frame.camera.reset();
+    frame.cam_from_world.reset();
+  }
+  for (DeviceInfo& device : session.devices)
+    if (device.modality == modality) device.lens.calibrated.reset();
+  return session;
 }
 
 }  // namespace orbitfuse

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/known/slips.hpp"
+
+// Known thermal poses held against the visible scene that they should stand in: nothing else of a
+// run would say that they live in another world, belong to other images, or have another lens'
+// focal length. Internal to recon/poses; errors: the renderer's, cancelled.
+namespace orbitfuse {
+
+/// What renders of the visible scene say of given thermal poses.
+struct SceneJudgement {
+  int views = 0;        ///< judged: of fewer than six nobody is
+  int best_of_all = 0;  ///< whose own image fits the render from there better than any other one
+  double median_correlation = 0;  ///< of an image with what the others' temperatures paint there
+  bool contradicted = false;      ///< the poses as a whole
+  std::optional<Slip> slip;       ///< that would explain it; its fit: the share best of all
+  /// By index, what speaks against a view: form and temperatures, or one of them.
+  std::vector<std::pair<std::size_t, std::string>> wrong, doubtful;
+};
+
+/// `images`: CV_32FC1 of the views' cameras' size, as lenses without distortion would have seen
+/// them. `scene` is asked for narrow renders only.
+Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene,
+                                      const std::vector<cv::Mat>& images,
+                                      const std::vector<PosedView>& views,
+                                      const Progress& progress);
+
+/// Why known poses as a whole are not believed.
+struct Contradiction {
+  std::string words;
+  double true_focal = 1;  ///< Slip::true_focal
+};
+
+/// Judges `poses`, which share the visible scene's world if they are right: single views that
+/// nothing supports are dropped, others doubted, both by name. Nothing is returned where they are
+/// believed.
+Result<std::optional<Contradiction>> check_by_scene(const Session& session,
+                                                    const VisibleScene& visible,
+                                                    const Progress& progress, ModalityPoses& poses);
+
+}  // namespace orbitfuse
