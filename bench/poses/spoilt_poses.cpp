@@ -8,6 +8,8 @@
 #include <random>
 #include <utility>
 
+#include "recon/poses/world_frame.hpp"
+
 namespace orbitfuse::scenes {
 namespace {
 
@@ -65,6 +67,18 @@ void jitter(Views& views, double degrees, double share) {
   }
 }
 
+/// Into a world turned about the views' mean up, and of another size, about the middle.
+void move_all(Views& views, double turn_deg, double scale) {
+  const Similarity3d canonical = canonical_from_world(views, {});
+  const Similarity3d move{
+      scale, Eigen::Quaterniond(Eigen::AngleAxisd(turn_deg * radians, Eigen::Vector3d::UnitZ())),
+      Eigen::Vector3d::Zero()};
+  const Similarity3d new_from_old = canonical.inverse() * move * canonical;
+  for (PosedView& view : views) {
+    view.cam_from_world = rebase(view.cam_from_world, new_from_old);
+  }
+}
+
 /// A world seen in a mirror has left-handed poses; readers that mend the handedness alone make
 /// these of them.
 void flip_axes(Views& views) {
@@ -73,7 +87,7 @@ void flip_axes(Views& views) {
 
 }  // namespace
 
-std::vector<SpoiltPoses> spoilt_poses(int count) {
+std::vector<SpoiltPoses> spoilt_poses(int count, Modality modality) {
   const int one = count / 3, opposite = (one + count / 4) % count;
   const auto of = [](int view) { return static_cast<std::size_t>(view); };
   std::vector<SpoiltPoses> list;
@@ -88,11 +102,17 @@ std::vector<SpoiltPoses> spoilt_poses(int count) {
     list.push_back({std::move(name), Fault::views, std::move(views), std::move(spoil)});
   };
   add(Fault::none, "as they are", [](Views&) {});
+  // Thermal edges say where a view is to half a degree, matches of photos to a tenth of one; the
+  // lines of matches hardly depend on the focal length.
+  const bool thermal = modality == Modality::thermal;
+  const auto photos_alone = thermal ? Fault::none : Fault::imprecise;
   add(Fault::none, "jitter .1 deg, .1 %", [](Views& v) { jitter(v, 0.1, 0.001); });
-  add(Fault::imprecise, "jitter .3 deg, .3 %", [](Views& v) { jitter(v, 0.3, 0.003); });
+  add(photos_alone, "jitter .3 deg, .3 %", [](Views& v) { jitter(v, 0.3, 0.003); });
   add(Fault::imprecise, "jitter 1 deg, 1 %", [](Views& v) { jitter(v, 1, 0.01); });
-  add(Fault::none, "focal length x 1.02", [](Views& v) { stretch_focal(v, 1.02); });
-  add(Fault::none, "focal length x 1.05", [](Views& v) { stretch_focal(v, 1.05); });
+  add(thermal ? Fault::imprecise : Fault::none, "focal length x 1.02",
+      [](Views& v) { stretch_focal(v, 1.02); });
+  add(thermal ? Fault::all : Fault::none, "focal length x 1.05",
+      [](Views& v) { stretch_focal(v, 1.05); });
   all("focal length x 1.3", [](Views& v) { stretch_focal(v, 1.3); });
   all("focal length x .7", [](Views& v) { stretch_focal(v, 0.7); });
   all("focal length x 10", [](Views& v) { stretch_focal(v, 10); });
@@ -106,6 +126,12 @@ std::vector<SpoiltPoses> spoilt_poses(int count) {
     for (PosedView& view : v) view.cam_from_world = view.cam_from_world.inverse();
   });
   all("y and z turned", flip_axes);
+  if (thermal) {
+    all("world turned by 90 deg", [](Views& v) { move_all(v, 90, 1); });
+    all("world turned by 5 deg", [](Views& v) { move_all(v, 5, 1); });
+    all("in millimetres", [](Views& v) { move_all(v, 0, 1000); });
+    all("world 1.1 times as large", [](Views& v) { move_all(v, 0, 1.1); });
+  }
   some("neighbours exchanged", {one, one + 1}, [=](Views& v) { exchange(v, one, one + 1); });
   some("distant ones exchanged", {one, opposite}, [=](Views& v) { exchange(v, one, opposite); });
   some("one rolled by 180 deg", {one},

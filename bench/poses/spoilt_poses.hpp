@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/geometry/reconstruction.hpp"
+#include "core/modality.hpp"
 
 namespace orbitfuse::scenes {
 
@@ -21,7 +22,8 @@ struct SpoiltPoses {
   std::function<void(std::vector<PosedView>&)> spoil;
 };
 
-/// For `count` views in the order of capture.
-std::vector<SpoiltPoses> spoilt_poses(int count);
+/// For `count` views in the order of capture. Photos can't tell the world that all of them live in:
+/// that is spoilt for thermal views alone, which share the visible ones'.
+std::vector<SpoiltPoses> spoilt_poses(int count, Modality modality);
 
 }  // namespace orbitfuse::scenes

@@ -11,6 +11,7 @@
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
 #include "recon/alignment/whole_view.hpp"
+#include "recon/poses/cross_modal/orbit_refinement.hpp"
 #include "recon/poses/cross_modal/painted_scene.hpp"
 #include "recon/poses/cross_modal/scene_views.hpp"
 #include "recon/poses/world_frame.hpp"
@@ -27,6 +28,10 @@ constexpr double control_turn_deg = 10;
 /// Right poses of seven scenes make every view's own image the best one, poses in another world one
 /// of 24, a focal length 1.3 times too long fewer than half (docs/benchmarks/known_poses.md).
 constexpr double believed_share = 0.5, mended_share = 0.75;
+/// Where the views' edges place them: right poses of seven scenes 0.70 degrees aside in the median
+/// at most, of a focal length 2 % too long 1.1 and more, 5 % too long 2.6, of a world turned by 5
+/// degrees or a tenth too large 4.2.
+constexpr double precise_apart_deg = 0.9, believed_apart_deg = 2;
 /// Of the median view's correlation: of right views 0.61 and more, of wrong ones whose own image is
 /// the best all the same 0.26 at most.
 constexpr double least_correlation_share = 0.45;
@@ -91,6 +96,26 @@ Result<std::vector<bool>> own_is_best(const SceneRenderer& scene,
   return best;
 }
 
+bool comparable(const std::vector<PosedView>& views) {
+  std::size_t with_controls = 0;
+  for (std::size_t v = 0; v < views.size(); ++v)
+    with_controls += controls_of(views, v).size() >= least_controls ? 1 : 0;
+  return 2 * with_controls >= views.size();
+}
+
+Result<double> median_apart_deg(const SceneRenderer& scene, const OrbitViews& orbit,
+                                const std::vector<PosedView>& views, const Progress& progress) {
+  RenderAlignmentOptions alone;
+  alone.focal_relative_sigma = 0;
+  alone.rounds = wide_rounds();
+  ORBITFUSE_ASSIGN(const Fit placed,
+                   align_with_renders(scene, orbit.images, views, alone, progress));
+  std::vector<double> apart;
+  for (std::size_t v = 0; v < views.size(); ++v)
+    apart.push_back(apart_deg(orbit, views[v].cam_from_world, placed.views[v].view.cam_from_world));
+  return median(apart);
+}
+
 double share_of(const std::vector<bool>& best) {
   return static_cast<double>(std::count(best.begin(), best.end(), true)) /
          static_cast<double>(best.size());
@@ -149,40 +174,50 @@ void name_wrong(const std::vector<bool>& best,
 
 }  // namespace
 
-Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene,
-                                      const std::vector<cv::Mat>& images,
+Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene, const OrbitViews& orbit,
                                       const std::vector<PosedView>& views,
                                       const Progress& progress) {
   const TraceSpan span("check known poses");
   SceneJudgement judged;
-  if (views.size() < least_views) return judged;
-  std::size_t comparable = 0;
-  for (std::size_t v = 0; v < views.size(); ++v)
-    comparable += controls_of(views, v).size() >= least_controls ? 1 : 0;
-  if (2 * comparable < views.size()) return judged;
+  if (views.size() < least_views || !comparable(views)) return judged;
   judged.views = static_cast<int>(views.size());
   std::vector<cv::Mat> fields;
   for (std::size_t v = 0; v < views.size(); ++v)
-    fields.push_back(edges_at(images[v], narrow(views[v].camera)));
+    fields.push_back(edges_at(orbit.images[v], narrow(views[v].camera)));
   ORBITFUSE_ASSIGN(const std::vector<bool> best, own_is_best(scene, fields, views, progress));
   judged.best_of_all = static_cast<int>(std::count(best.begin(), best.end(), true));
-  if (share_of(best) >= believed_share) {
-    ORBITFUSE_ASSIGN(const auto like, correlations(scene, images, views, best, progress));
-    name_wrong(best, like, judged);
-    judged.contradicted = 2 * judged.wrong.size() > views.size();
+  if (share_of(best) < believed_share) {
+    judged.contradicted = true;
+    const PoseFit fit = [&](const std::vector<PosedView>& mended) -> Result<double> {
+      ORBITFUSE_ASSIGN(const std::vector<bool> then, own_is_best(scene, fields, mended, progress));
+      return share_of(then);
+    };
+    ORBITFUSE_ASSIGN(judged.slip, likeliest_slip(views, fit));
+    if (judged.slip && judged.slip->fit < mended_share) judged.slip.reset();
     return judged;
   }
-  judged.contradicted = true;
-  const PoseFit fit = [&](const std::vector<PosedView>& mended) -> Result<double> {
-    ORBITFUSE_ASSIGN(const std::vector<bool> then, own_is_best(scene, fields, mended, progress));
-    return share_of(then);
-  };
-  ORBITFUSE_ASSIGN(judged.slip, likeliest_slip(views, fit));
-  if (judged.slip && judged.slip->fit < mended_share) judged.slip.reset();
+  ORBITFUSE_ASSIGN(judged.median_apart_deg, median_apart_deg(scene, orbit, views, progress));
+  ORBITFUSE_ASSIGN(const auto like, correlations(scene, orbit.images, views, best, progress));
+  name_wrong(best, like, judged);
+  judged.contradicted =
+      judged.median_apart_deg > believed_apart_deg || 2 * judged.wrong.size() > views.size();
   return judged;
 }
 
 namespace {
+
+std::string words_of(const SceneJudgement& judged) {
+  std::string words =
+      fmt::format("from {} of {} known poses the view's own image fits the visible scene best",
+                  judged.best_of_all, judged.views);
+  if (judged.slip)
+    return words + fmt::format("; it looks as if {}: {:.0f} % would then do", judged.slip->words,
+                               100 * judged.slip->fit);
+  if (judged.median_apart_deg > 0)
+    words += fmt::format("; the views' edges place them {:.1f} deg aside in the median",
+                         judged.median_apart_deg);
+  return words;
+}
 
 void take(const SceneJudgement& judged, const std::vector<PosedView>& views, ModalityPoses& poses) {
   for (const auto& [view, why] : judged.wrong) {
@@ -214,31 +249,31 @@ Result<std::optional<Contradiction>> check_by_scene(const Session& session,
   if (given.size() < least_views) return unchecked(fmt::format("{} views", given.size()));
   progress.report({"poses.thermal", 0, 1, {}, "renders, to check the known poses"});
   std::vector<PosedView> views = given;
-  std::vector<cv::Mat> images;
+  OrbitViews orbit;
+  orbit.canonical_from_world = canonical_from_world(visible.reconstruction.views, {});
   for (PosedView& view : views) {
     const auto frame =
         std::find_if(session.frames.begin(), session.frames.end(),
                      [&](const FrameRecord& record) { return record.file == view.name; });
     ORBITFUSE_ASSIGN(cv::Mat image, straight_luminance(session, *frame, view.camera));
-    images.push_back(std::move(image));
+    orbit.images.push_back(std::move(image));
     view.camera = view.camera.without_distortion();
   }
-  ORBITFUSE_ASSIGN(
-      const SceneRenderer scene,
-      scene_of(visible, canonical_from_world(visible.reconstruction.views, {}), progress));
-  ORBITFUSE_ASSIGN(const SceneJudgement judged, judge_by_scene(scene, images, views, progress));
+  ORBITFUSE_ASSIGN(const SceneRenderer scene,
+                   scene_of(visible, orbit.canonical_from_world, progress));
+  ORBITFUSE_ASSIGN(const SceneJudgement judged, judge_by_scene(scene, orbit, views, progress));
   poses.gates["known_poses_checked"] = judged.views;
   if (judged.views == 0) return unchecked("all views look the same way");
   poses.gates["known_poses_best_of_all"] = judged.best_of_all;
-  const std::string figures =
-      fmt::format("from {} of {} known poses the view's own image fits the visible scene best",
-                  judged.best_of_all, judged.views);
-  if (judged.contradicted && judged.slip)
-    return std::optional(
-        Contradiction{fmt::format("{}; it looks as if {}: {:.0f} % would then do", figures,
-                                  judged.slip->words, 100 * judged.slip->fit),
-                      judged.slip->true_focal});
-  if (judged.contradicted) return std::optional(Contradiction{figures});
+  poses.gates["known_poses_apart_deg"] = judged.median_apart_deg;
+  const std::string figures = words_of(judged);
+  if (judged.contradicted)
+    return std::optional(Contradiction{figures, judged.slip ? judged.slip->true_focal : 1});
+  if (judged.median_apart_deg > precise_apart_deg)
+    poses.warnings.push_back(
+        fmt::format("the known thermal poses are imprecise: their edges place the views {:.1f} deg "
+                    "aside in the median, of right poses half a degree",
+                    judged.median_apart_deg));
   poses.ladder.back().why += "; " + figures;
   take(judged, given, poses);
   return believed;

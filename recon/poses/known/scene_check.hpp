@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <opencv2/core.hpp>
 #include <optional>
 
+#include "recon/poses/cross_modal/orbit_views.hpp"
 #include "recon/poses/estimate_poses.hpp"
 #include "recon/poses/known/slips.hpp"
 
@@ -16,6 +16,9 @@ namespace orbitfuse {
 struct SceneJudgement {
   int views = 0;        ///< judged: of fewer than six nobody is
   int best_of_all = 0;  ///< whose own image fits the render from there better than any other one
+  /// From the given poses to where the views' edges place them in the scene: of the centre as seen
+  /// from the orbit's middle, or of the turn if that is larger.
+  double median_apart_deg = 0;
   double median_correlation = 0;  ///< of an image with what the others' temperatures paint there
   bool contradicted = false;      ///< the poses as a whole
   std::optional<Slip> slip;       ///< that would explain it; its fit: the share best of all
@@ -23,10 +26,10 @@ struct SceneJudgement {
   std::vector<std::pair<std::size_t, std::string>> wrong, doubtful;
 };
 
-/// `images`: CV_32FC1 of the views' cameras' size, as lenses without distortion would have seen
-/// them. `scene` is asked for narrow renders only.
-Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene,
-                                      const std::vector<cv::Mat>& images,
+/// `orbit`: images (CV_32FC1 of the views' cameras' size, as lenses without distortion would have
+/// seen them) and its canonical world; stations may be absent. `scene` is asked for narrow renders
+/// only.
+Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene, const OrbitViews& orbit,
                                       const std::vector<PosedView>& views,
                                       const Progress& progress);
 
