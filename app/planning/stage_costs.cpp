@@ -14,7 +14,8 @@ namespace {
 // Seconds on two cores of an Intel Xeon (Sapphire Rapids), from the traces of whole runs
 // (`run --trace`, docs/notes/planner.md); all but steps, fusion and the report from runs on an AMD
 // EPYC, 2026-11-28 (visible poses the day before), by its slowness of 1.27.
-constexpr double start_s = 0.3, known_poses_s = 0.5;
+/// Known poses are held against the images: 2.5 s each for 24 views.
+constexpr double start_s = 0.3, known_pose_s = 0.1;
 constexpr double visible_pose_s =
     0.3;  // a view: features, matching, mapping; 0.15 to 0.45 by scene, 1.4 where texture is faint
 /// A view: search, renders, temperatures. 0.75 to 1.05 by scene; what is wrong is made good later,
@@ -77,7 +78,7 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   }
   if (photos > 0) {
     if (stage == "poses_visible")
-      return facts.visible_posed ? known_poses_s : start_s + photos * visible_pose_s;
+      return start_s + photos * (facts.visible_posed ? known_pose_s : visible_pose_s);
     if (stage == "depth")
       return start_s + photos * depth_view_s * facts.visible_height_by_width / 0.75 *
                            std::pow(facts.depth_width_px / 400.0, depth_power);
@@ -87,9 +88,9 @@ double stage_s(const std::string& stage, const SceneFacts& facts, const Effort& 
   }
   if (thermal > 0) {
     if (stage == "poses_thermal")
-      return facts.thermal_posed
-                 ? known_poses_s
-                 : start_s + thermal * thermal_pose_s * fog(facts, effort, thermal_pose_fog);
+      return start_s + thermal * (facts.thermal_posed
+                                      ? known_pose_s
+                                      : thermal_pose_s * fog(facts, effort, thermal_pose_fog));
     if (stage == "train_thermal")
       return start_s + thermal * (thermal_view_s + (photos > 0 ? 0 : thermal_depth_view_s)) +
              thermal_checks_s + effort.thermal_steps * thermal_step;

@@ -59,6 +59,16 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
   return ThermalPoses{std::move(poses), false};
 }
 
+/// Known poses that nothing confirms and nothing can replace.
+ThermalPoses in_doubt(ModalityPoses known, const Error& why) {
+  known.doubtful.clear();
+  for (const PosedView& view : known.reconstruction.views)
+    known.doubtful.push_back(
+        {view.name, DoubtReason::undecided, "nothing confirms its known pose"});
+  known.ladder.push_back({"from the images", false, why.found, 0, known.frame_count, 0});
+  return {std::move(known), true};
+}
+
 }  // namespace
 
 Result<ThermalPoses> estimate_thermal_poses(const Session& session, const VisibleScene* visible,
@@ -78,15 +88,20 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   if (!contradiction) return ThermalPoses{std::move(known), shares};
   LadderStep step = known.ladder.back();
   step.held = false, step.why = contradiction->words;
-  ORBITFUSE_ASSIGN(ThermalPoses poses, estimated(without_known_poses(session, Modality::thermal,
-                                                                     contradiction->true_focal),
-                                                 visible, options, workdir, progress, {step}));
-  poses.warnings.insert(
-      poses.warnings.begin(),
-      fmt::format("the known thermal poses contradict the visible scene and were estimated from "
-                  "the images instead: {}; correct them, or set poses.check_known_poses = false "
-                  "to take them as they are",
-                  contradiction->words));
+  Result<ThermalPoses> poses =
+      estimated(without_known_poses(session, Modality::thermal, contradiction->true_focal), visible,
+                options, workdir, progress, {step});
+  const bool found = poses.has_value();
+  if (!found && poses.error().kind != ErrorKind::quality) return poses;
+  if (!found) poses = in_doubt(std::move(known), poses.error());
+  poses->warnings.insert(
+      poses->warnings.begin(),
+      fmt::format(
+          "the known thermal poses contradict the visible scene{}: {}; correct them, or set "
+          "poses.check_known_poses = false to take them as they are",
+          found ? " and were estimated from the images instead"
+                : ", and the images alone place no views: they are all in doubt",
+          contradiction->words));
   return poses;
 }
 

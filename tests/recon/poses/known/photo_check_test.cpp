@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "recon/poses/known/photo_check.hpp"
+
+#include <gmock/gmock.h>
+
+#include "recon/poses/index.hpp"
+#include "recon/poses/known/line_misses.hpp"
+#include "tests/recon/poses/feature_scene.hpp"
+
+namespace orbitfuse {
+namespace {
+
+using ::testing::HasSubstr;
+using testing_orbit::FeatureScene;
+
+Reconstruction given(const FeatureScene& scene) {
+  Reconstruction model;
+  model.views = scene.truth;
+  return model;
+}
+
+void turn(PosedView& view, double angle_deg, const Eigen::Vector3d& axis) {
+  view.cam_from_world =
+      Rigid3d{Eigen::Quaterniond(Eigen::AngleAxisd(angle_deg * EIGEN_PI / 180, axis.normalized())),
+              Eigen::Vector3d::Zero()} *
+      view.cam_from_world;
+}
+
+std::vector<int> frames_of(const std::vector<std::pair<int, std::string>>& named) {
+  std::vector<int> frames;
+  for (const auto& [frame, why] : named) frames.push_back(frame);
+  std::sort(frames.begin(), frames.end());
+  return frames;
+}
+
+TEST(PhotoCheck, RightPosesPassWithoutAWord) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  const PhotoJudgement judged = judge_by_photos(scene.graph, given(scene));
+  EXPECT_EQ(judged.checked, 24);
+  EXPECT_GT(judged.share, 0.95);
+  EXPECT_LT(judged.median_px, 1);
+  EXPECT_FALSE(judged.contradicted);
+  EXPECT_FALSE(judged.slip);
+  EXPECT_TRUE(judged.wrong.empty() && judged.doubtful.empty());
+}
+
+TEST(PhotoCheck, OneViewTurnedOrTwoExchangedAreNamedAndNoOther) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  Reconstruction turned = given(scene);
+  turn(turned.views[7], 180, {0, 0, 1});
+  PhotoJudgement judged = judge_by_photos(scene.graph, turned);
+  EXPECT_FALSE(judged.contradicted);
+  EXPECT_EQ(frames_of(judged.wrong), std::vector<int>{7});
+  EXPECT_TRUE(judged.doubtful.empty());
+  ASSERT_FALSE(judged.wrong.empty());
+  EXPECT_THAT(judged.wrong.front().second, HasSubstr("its known pose gives: correct it"));
+
+  Reconstruction exchanged = given(scene);
+  std::swap(exchanged.views[3].cam_from_world, exchanged.views[9].cam_from_world);
+  judged = judge_by_photos(scene.graph, exchanged);
+  EXPECT_FALSE(judged.contradicted);
+  EXPECT_EQ(frames_of(judged.wrong), (std::vector<int>{3, 9}));
+}
+
+TEST(PhotoCheck, AMistakeOfAllPosesIsCalledByItsName) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  const auto slip_of = [&](const Reconstruction& spoilt) {
+    const PhotoJudgement judged = judge_by_photos(scene.graph, spoilt);
+    EXPECT_TRUE(judged.contradicted);
+    return judged.slip ? judged.slip->words : "none";
+  };
+  Reconstruction shifted = given(scene);
+  for (std::size_t v = 0; v < 24; ++v)
+    shifted.views[v].cam_from_world = scene.truth[(v + 1) % 24].cam_from_world;
+  EXPECT_EQ(slip_of(shifted), "each pose is the next image's");
+  Reconstruction inverted = given(scene);
+  for (PosedView& view : inverted.views) view.cam_from_world = view.cam_from_world.inverse();
+  EXPECT_THAT(slip_of(inverted), HasSubstr("inverted"));
+  Reconstruction flipped = given(scene);
+  for (PosedView& view : flipped.views) turn(view, 180, {1, 0, 0});
+  EXPECT_THAT(slip_of(flipped), HasSubstr("y and z axes are turned"));
+  Reconstruction longer = given(scene);
+  for (PosedView& view : longer.views) view.camera.fx *= 1.3, view.camera.fy *= 1.3;
+  const PhotoJudgement judged = judge_by_photos(scene.graph, longer);
+  ASSERT_TRUE(judged.slip);
+  EXPECT_THAT(judged.slip->words, HasSubstr("focal length"));
+  EXPECT_NEAR(judged.slip->true_focal, 1 / 1.3, 0.02);
+}
+
+TEST(PhotoCheck, PosesOfAnotherSceneAreContradictedThoughNoMistakeExplainsThem) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  Reconstruction random = given(scene);
+  std::mt19937 rng(4);
+  std::shuffle(random.views.begin(), random.views.end(), rng);
+  for (std::size_t v = 0; v < random.views.size(); ++v) random.views[v].name = scene.truth[v].name;
+  const PhotoJudgement judged = judge_by_photos(scene.graph, random);
+  EXPECT_TRUE(judged.contradicted);
+  EXPECT_FALSE(judged.slip);
+}
+
+TEST(PhotoCheck, PosesThatAreAllALittleOffAreImpreciseAndNoneIsNamed) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  Reconstruction off = given(scene);
+  std::mt19937 rng(2);
+  std::normal_distribution<double> normal(0, 0.5);
+  for (PosedView& view : off.views) {
+    turn(view, normal(rng), {1, 0, 0});
+    turn(view, normal(rng), {0, 1, 0});
+  }
+  const PhotoJudgement judged = judge_by_photos(scene.graph, off);
+  EXPECT_FALSE(judged.contradicted);
+  EXPECT_GT(judged.median_px, 1.5);
+  EXPECT_TRUE(judged.wrong.empty());
+}
+
+TEST(PhotoCheck, WithoutMatchesNothingIsJudged) {
+  FeatureScene scene = testing_orbit::described_scene();
+  scene.graph.verified.clear();
+  Reconstruction inverted = given(scene);
+  for (PosedView& view : inverted.views) view.cam_from_world = view.cam_from_world.inverse();
+  const PhotoJudgement judged = judge_by_photos(scene.graph, inverted);
+  EXPECT_EQ(judged.checked, 0);
+  EXPECT_FALSE(judged.contradicted);
+  EXPECT_TRUE(judged.wrong.empty());
+}
+
+TEST(LineMisses, TwoCamerasAtOnePlaceHaveNoLines) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  Reconstruction at_one_place = given(scene);
+  for (PosedView& view : at_one_place.views)
+    view.cam_from_world = at_one_place.views.front().cam_from_world;
+  EXPECT_TRUE(line_misses(scene.graph, posed_frames(scene.graph, at_one_place)).empty());
+  EXPECT_EQ(judge_by_photos(scene.graph, at_one_place).checked, 0);
+}
+
+}  // namespace
+}  // namespace orbitfuse
