@@ -23,12 +23,15 @@ class Gathering {
 
   Result<ImportInputs> run() {
     ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_, remarks_));
-    ORBITFUSE_ASSIGN(const auto visible, visible_sources());
-    ORBITFUSE_ASSIGN(const auto visible_tracking,
-                     listed(Modality::visible, options_.visible_tracking));
     ORBITFUSE_ASSIGN(const auto thermal, thermal_sources());
     ORBITFUSE_ASSIGN(const auto thermal_tracking,
                      listed(Modality::thermal, options_.thermal_tracking));
+    if (!options_.thermal.empty())
+      if (const std::size_t given = give_to_thermal(thermal, inputs_.known))
+        remarks_.add(fmt::format("{} of the poses given are of thermal images", given));
+    ORBITFUSE_ASSIGN(const auto visible, visible_sources());
+    ORBITFUSE_ASSIGN(const auto visible_tracking,
+                     listed(Modality::visible, options_.visible_tracking));
     ORBITFUSE_TRY(check_given_once(visible, visible_tracking));
     ORBITFUSE_TRY(check_given_once(thermal, thermal_tracking));
     ORBITFUSE_TRY(check_known(Modality::visible, {&visible, &visible_tracking}));

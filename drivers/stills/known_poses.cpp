@@ -192,4 +192,19 @@ Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& opt
   return known;
 }
 
+std::size_t give_to_thermal(const std::vector<fs::path>& thermal_files,
+                            std::map<Modality, KnownViews>& known) {
+  std::set<std::string> thermal;
+  for (const fs::path& file : thermal_files) thermal.insert(canonical_name(file));
+  KnownViews visible;
+  std::size_t given = 0;
+  for (const KnownView& view : known[Modality::visible].all()) {
+    const bool is_thermal = thermal.contains(canonical_name(view.file));
+    (is_thermal ? known[Modality::thermal] : visible).add(view);
+    given += is_thermal ? 1 : 0;
+  }
+  if (given > 0) known[Modality::visible] = std::move(visible);
+  return given;
+}
+
 }  // namespace orbitfuse

@@ -57,6 +57,11 @@ class KnownViews {
 Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& options,
                                                         Remarks& remarks);
 
+/// A transforms.json says of no frame which camera took it: views of these files, given as thermal
+/// images, become thermal ones. Returns how many.
+std::size_t give_to_thermal(const std::vector<std::filesystem::path>& thermal_files,
+                            std::map<Modality, KnownViews>& known);
+
 /// ground_truth.json: K, and c2w per frame, of "visible" and "thermal" (docs/formats.md).
 Result<std::map<Modality, KnownViews>> read_ground_truth_views(const std::filesystem::path& file);
 

@@ -103,9 +103,9 @@ struct VisibleScene {
   SceneRenderer renderer;  ///< of its trained field; without it only a rig places thermal views
 };
 
-/// Visible views: known poses that the photos don't contradict, else COLMAP with orbit-limited pairs
-/// and ever more relaxed settings, then bundle adjustment. World frame: z up, origin at the point the
-/// cameras look at, median camera distance 1 (unless poses are known: then theirs).
+/// Visible views: known poses that the photos don't contradict, else COLMAP with orbit-limited
+/// pairs and ever more relaxed settings, then bundle adjustment. World frame: z up, origin at the
+/// point the cameras look at, median camera distance 1 (unless poses are known: then theirs).
 /// `workdir`: a folder to write in, made where it isn't there; below it "visible" (thermal views:
 /// "thermal") is written over, and holds reduced images, COLMAP's database, models and log
 /// afterwards, of failures too. Nothing reads them again: the caller may remove them. Not touched

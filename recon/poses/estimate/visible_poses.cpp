@@ -3,9 +3,9 @@
 
 #include <fmt/format.h>
 
+#include "recon/poses/estimate/visible_ladder.hpp"
 #include "recon/poses/known/known_poses.hpp"
 #include "recon/poses/known/photo_check.hpp"
-#include "recon/poses/estimate/visible_ladder.hpp"
 
 namespace orbitfuse {
 

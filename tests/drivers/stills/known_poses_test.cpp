@@ -71,5 +71,33 @@ TEST_F(KnownPoses, MasksAndDepthsThatNothingUsesAreTold) {
   EXPECT_THAT(report->warnings, test::none_says("depth_file_path"));
 }
 
+TEST_F(KnownPoses, FramesOfThermalImagesGivenAsSuchAreThermal) {
+  put_photo("in/0.jpg", 0);
+  put_photo("in/1.jpg", 1);
+  std::filesystem::create_directory(folder / "flir");
+  for (int i = 0; i < 2; ++i) {
+    cv::Mat kelvin(30, 40, CV_32F);
+    cv::RNG(static_cast<std::uint64_t>(i + 7)).fill(kelvin, cv::RNG::UNIFORM, 290, 310);
+    ASSERT_TRUE(write_thermal_tiff(folder / "flir" / (std::to_string(i) + ".tiff"), kelvin));
+  }
+  put_transforms({"in/0.jpg", "flir/0.tiff", "in/1.jpg", "flir/1.tiff"}, 1);
+  options.thermal = {folder / "flir"};
+  for (const bool photos_given : {false, true}) {
+    if (photos_given) options.visible = {folder / "in"};
+    std::filesystem::remove_all(folder / "session");
+    const auto report = import();
+    ASSERT_TRUE(report) << report.error().message();
+    EXPECT_EQ(report->visible, 2);
+    EXPECT_EQ(report->thermal, 2);
+    EXPECT_EQ(report->with_pose, 4);
+    EXPECT_THAT(report->warnings, test::one_says("2 of the poses given are of thermal images"));
+    for (const FrameRecord& frame : report->session.frames) {
+      ASSERT_TRUE(frame.cam_from_world);
+      const double place = frame.cam_from_world->translation.x();
+      EXPECT_EQ(place == 1 || place == 3, frame.modality == Modality::thermal) << frame.file;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace orbitfuse
