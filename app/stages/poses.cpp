@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "app/stages/artifacts.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/image/image_io.hpp"
@@ -130,12 +128,6 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
                 poses.shares_visible_frame ? PoseFrame::visible : PoseFrame::own);
 }
 
-bool all_posed(const Session& session) {
-  const auto frames = session.frames_of(Modality::thermal, false);
-  return std::all_of(frames.begin(), frames.end(),
-                     [](const FrameRecord* f) { return f->cam_from_world.has_value(); });
-}
-
 }  // namespace
 
 pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
@@ -146,9 +138,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   if (!visible) {
     stage.version = 24;  // known poses are held against the visible scene
     stage.uses = {"poses_visible"};
-    // Thermal views are aligned with renders of the visible field, known poses held against them.
-    const PoseOptions& poses = in.config->poses;
-    if (!poses.use_known_poses || poses.check_known_poses || !all_posed(in.session->session))
+    if (asks_for_renders(in.session->session, in.config->poses))
       stage.uses.push_back("train_visible");
   }
   stage.options = in.config->settings().to_json("poses");

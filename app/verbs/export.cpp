@@ -5,6 +5,7 @@
 #include <set>
 
 #include "app/cli/option_pairs.hpp"
+#include "app/cli/run_folder.hpp"
 #include "app/cli/run_stages.hpp"
 #include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
@@ -182,10 +183,11 @@ Status export_surface(Context& context, const std::vector<fs::path>& files,
     context.result["files"].push_back(file.string());
     context.console.data(file.string());
   }
-  context.console.info(fmt::format("{} triangles, {} vertices, {} of them without {}",
-                                   surface.mesh.triangles.size(), surface.mesh.vertices.size(),
-                                   surface.without_temperature,
-                                   run.thermal_is_gray ? "infrared level" : "temperature"));
+  context.console.info(
+      fmt::format("{}{} vertices, {} of them without {}",
+                  how.points ? "" : fmt::format("{} triangles, ", surface.mesh.triangles.size()),
+                  surface.mesh.vertices.size(), surface.without_temperature,
+                  run.thermal_is_gray ? "infrared level" : "temperature"));
   return {};
 }
 
@@ -227,6 +229,19 @@ Status check_targets(const ExportArguments& o, const std::vector<fs::path>& file
   return check_dataset_folder(o.dataset);
 }
 
+/// What lies among a session's frames would be taken for one of them.
+Status check_outside_frames(const ExportArguments& o, const view::FinishedRun& run,
+                            const std::vector<fs::path>& files) {
+  if (!run.session) return {};
+  const auto check = [&](const char* option, const fs::path& target) -> Status {
+    if (!lies_among_frames(target, run.session->folder)) return {};
+    return fail(ErrorKind::usage, option,
+                "'" + target.string() + "', among the frames of the session", "write it elsewhere");
+  };
+  for (const fs::path& file : files) ORBITFUSE_TRY(check("--to", file));
+  return o.dataset.empty() ? Status{} : check("--dataset", o.dataset);
+}
+
 /// Options that another one would have passed over in silence.
 Status check_pairs(const ExportArguments& o) {
   const bool surface = o.dataset.empty() || !o.files.empty();
@@ -266,6 +281,7 @@ Status run(Context& context, const ExportArguments& o) {
   }
   ORBITFUSE_ASSIGN(const view::FinishedRun run,
                    view::load_finished_run(o.out, context.config, context.progress));
+  ORBITFUSE_TRY(check_outside_frames(o, run, files));
   ORBITFUSE_ASSIGN(const FileOptions how, file_options(o, run, request));
   for (const std::string& note : run.notes) context.console.warning(note);
   ORBITFUSE_ASSIGN(const auto scale, scale_of(context, o, run));

@@ -14,8 +14,8 @@
 #include "core/system/cpu.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
-#include "recon/poses/known/known_poses.hpp"
 #include "recon/poses/known/scene_check.hpp"
+#include "recon/poses/known/session_poses.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "tests/support/temp_folder.hpp"
 

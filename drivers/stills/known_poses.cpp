@@ -147,6 +147,9 @@ std::string KnownViews::ambiguity(const fs::path& file) const {
     return fmt::format("{} has the name of another image", file.string());
   const auto named = by_name_.find(file.filename().string());
   if (named == by_name_.end() || named->second.size() < 2 || find(file)) return {};
+  std::set<std::string> files;
+  for (const std::size_t index : named->second) files.insert(canonical_name(views_[index].file));
+  if (files.size() == 1) return fmt::format("{} has two different poses", file.filename().string());
   constexpr std::size_t most_named = 3;
   std::vector<std::string> folders;
   for (const std::size_t index : named->second) {

@@ -125,6 +125,10 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                                             const std::filesystem::path& workdir,
                                             const Progress& progress);
 
+/// Whether estimate_thermal_poses() would ask `visible` for renders: to place thermal views, or to
+/// hold known poses against them, which takes a known visible world and six views.
+bool asks_for_renders(const Session& session, const PoseOptions& options);
+
 /// How thermal frames are paired with photos that one device shot at once, as far as the answer of
 /// estimate_thermal_poses() depends on it: "40 pairs by equal file names, declared"; "": no rig.
 std::string described_rig(const Session& session);

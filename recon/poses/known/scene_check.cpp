@@ -19,10 +19,10 @@
 namespace orbitfuse {
 namespace {
 
-/// Of few images one's own is soon the best.
-constexpr std::size_t least_views = 6;
 /// Images that a view's own is compared with: more would say the same.
 constexpr std::size_t most_controls = 24;
+/// So many tell which mistake it is.
+constexpr std::size_t views_to_try_slips = 12;
 /// A view turned by less shows nearly the same.
 constexpr double control_turn_deg = 10;
 /// Right poses of seven scenes make every view's own image the best one, poses in another world one
@@ -81,14 +81,14 @@ Result<int> rivals(const SceneRenderer& scene, const std::vector<cv::Mat>& field
   return as_good;
 }
 
-/// Of each view, whether its own image is the best one for its place. A place that shows nothing is
-/// none.
+/// Of each view, or each `every`th, whether its own image is the best one for its place. A place
+/// that shows nothing is none.
 Result<std::vector<bool>> own_is_best(const SceneRenderer& scene,
                                       const std::vector<cv::Mat>& fields,
-                                      const std::vector<PosedView>& views,
-                                      const Progress& progress) {
+                                      const std::vector<PosedView>& views, const Progress& progress,
+                                      std::size_t every = 1) {
   std::vector<bool> best;
-  for (std::size_t v = 0; v < views.size(); ++v) {
+  for (std::size_t v = 0; v < views.size(); v += every) {
     ORBITFUSE_TRY(progress.check("poses.thermal"));
     ORBITFUSE_ASSIGN(const int as_good, rivals(scene, fields, views, v));
     best.push_back(as_good == 0);
@@ -179,7 +179,7 @@ Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene, const OrbitVie
                                       const Progress& progress) {
   const TraceSpan span("check known poses");
   SceneJudgement judged;
-  if (views.size() < least_views || !comparable(views)) return judged;
+  if (views.size() < least_views_to_judge || !comparable(views)) return judged;
   judged.views = static_cast<int>(views.size());
   std::vector<cv::Mat> fields;
   for (std::size_t v = 0; v < views.size(); ++v)
@@ -188,8 +188,10 @@ Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene, const OrbitVie
   judged.best_of_all = static_cast<int>(std::count(best.begin(), best.end(), true));
   if (share_of(best) < believed_share) {
     judged.contradicted = true;
+    const std::size_t every = std::max<std::size_t>(1, views.size() / views_to_try_slips);
     const PoseFit fit = [&](const std::vector<PosedView>& mended) -> Result<double> {
-      ORBITFUSE_ASSIGN(const std::vector<bool> then, own_is_best(scene, fields, mended, progress));
+      ORBITFUSE_ASSIGN(const std::vector<bool> then,
+                       own_is_best(scene, fields, mended, progress, every));
       return share_of(then);
     };
     ORBITFUSE_ASSIGN(judged.slip, likeliest_slip(views, fit));
@@ -246,7 +248,7 @@ Result<std::optional<Contradiction>> check_by_scene(const Session& session,
     return believed;
   };
   if (!visible.renderer) return unchecked("there is no visible field to see them in");
-  if (given.size() < least_views) return unchecked(fmt::format("{} views", given.size()));
+  if (given.size() < least_views_to_judge) return unchecked(fmt::format("{} views", given.size()));
   progress.report({"poses.thermal", 0, 1, {}, "renders, to check the known poses"});
   std::vector<PosedView> views = given;
   OrbitViews orbit;

@@ -12,9 +12,12 @@
 // focal length. Internal to recon/poses; errors: the renderer's, cancelled.
 namespace orbitfuse {
 
+/// Of few images one's own is soon the best.
+inline constexpr std::size_t least_views_to_judge = 6;
+
 /// What renders of the visible scene say of given thermal poses.
 struct SceneJudgement {
-  int views = 0;        ///< judged: of fewer than six nobody is
+  int views = 0;        ///< judged: all or, of few, none
   int best_of_all = 0;  ///< whose own image fits the render from there better than any other one
   /// From the given poses to where the views' edges place them in the scene: of the centre as seen
   /// from the orbit's middle, or of the turn if that is larger.

@@ -99,7 +99,9 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
        {std::tuple("--dataset", out / "fuse/pairs", 2, "inside of a stage"),
         std::tuple("--dataset", fs::path("/proc/nowhere/pairs"), 4, "/proc/nowhere/pairs"),
         std::tuple("--to", fs::path("/proc/nowhere/a.glb"), 4, "/proc/nowhere"),
-        std::tuple("--to", session / "manifest.jsonl/a.glb", 3, "no folder")}) {
+        std::tuple("--to", session / "manifest.jsonl/a.glb", 3, "no folder"),
+        std::tuple("--to", session / "visible/a.glb", 2, "among the frames of the session"),
+        std::tuple("--dataset", session / "thermal/pairs", 2, "among the frames of the session")}) {
     expect_refused({"export", out.string(), option, target.string()}, code, said);
   }
   expect_refused(

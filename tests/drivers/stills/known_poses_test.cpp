@@ -35,6 +35,14 @@ TEST_F(KnownPoses, AnImageWithTwoDifferentPosesHasNoneAndIsNamed) {
   EXPECT_EQ(report->with_pose, 2);
   EXPECT_THAT(report->warnings, test::one_says("1.jpg has two different poses"));
   EXPECT_THAT(report->warnings, test::none_says("the same image as"));
+  // Found by name, where the images lie elsewhere.
+  std::filesystem::rename(folder / "in", folder / "elsewhere");
+  std::filesystem::remove_all(folder / "session");
+  options.visible = {folder / "elsewhere"};
+  const auto by_name = import();
+  ASSERT_TRUE(by_name) << by_name.error().message();
+  EXPECT_EQ(by_name->with_pose, 2);
+  EXPECT_THAT(by_name->warnings, test::one_says("1.jpg has two different poses"));
 }
 
 TEST_F(KnownPoses, AnImageThatIsThereTwiceWithOnePoseIsOneFrame) {

@@ -3,7 +3,7 @@
 
 #include <gmock/gmock.h>
 
-#include "recon/poses/known/known_poses.hpp"
+#include "recon/poses/known/session_poses.hpp"
 #include "tests/support/box_scene.hpp"
 #include "tests/support/orbit_fixture.hpp"
 

@@ -4,8 +4,8 @@
 #include <fmt/format.h>
 
 #include "recon/poses/estimate/visible_ladder.hpp"
-#include "recon/poses/known/known_poses.hpp"
 #include "recon/poses/known/photo_check.hpp"
+#include "recon/poses/known/session_poses.hpp"
 
 namespace orbitfuse {
 

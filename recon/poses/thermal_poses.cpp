@@ -3,9 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "recon/poses/cross_modal/cross_modal.hpp"
-#include "recon/poses/known/known_poses.hpp"
 #include "recon/poses/known/scene_check.hpp"
+#include "recon/poses/known/session_poses.hpp"
 #include "recon/poses/rig/rig_poses.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
 
@@ -103,6 +105,16 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                 : ", and the images alone place no views: they are all in doubt",
           contradiction->words));
   return poses;
+}
+
+bool asks_for_renders(const Session& session, const PoseOptions& options) {
+  if (!options.use_known_poses || !has_known_poses(session, Modality::thermal)) return true;
+  const auto frames = session.frames_of(Modality::thermal);
+  const auto posed = std::count_if(frames.begin(), frames.end(), [](const FrameRecord* frame) {
+    return frame->cam_from_world.has_value();
+  });
+  return options.check_known_poses && has_known_poses(session, Modality::visible) &&
+         static_cast<std::size_t>(posed) >= least_views_to_judge;
 }
 
 std::string described_rig(const Session& session) {

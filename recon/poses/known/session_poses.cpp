@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/known/known_poses.hpp"
+#include "recon/poses/known/session_poses.hpp"
 
 #include <fmt/format.h>
 
