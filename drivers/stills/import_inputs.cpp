@@ -22,13 +22,13 @@ class Gathering {
       : options_(options), folder_(folder), decoder_(decoder), remarks_(remarks) {}
 
   Result<ImportInputs> run() {
-    ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_, remarks_));
-    ORBITFUSE_ASSIGN(const auto thermal, thermal_sources());
+    ORBITFUSE_ASSIGN(auto thermal, listed(Modality::thermal, options_.thermal));
     ORBITFUSE_ASSIGN(const auto thermal_tracking,
                      listed(Modality::thermal, options_.thermal_tracking));
-    if (!options_.thermal.empty())
-      if (const std::size_t given = give_to_thermal(thermal, inputs_.known))
-        remarks_.add(fmt::format("{} of the poses given are of thermal images", given));
+    std::vector<fs::path> thermal_files = thermal;
+    thermal_files.insert(thermal_files.end(), thermal_tracking.begin(), thermal_tracking.end());
+    ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_, thermal_files, remarks_));
+    if (options_.thermal.empty()) thermal = files_of_transforms(Modality::thermal);
     ORBITFUSE_ASSIGN(const auto visible, visible_sources());
     ORBITFUSE_ASSIGN(const auto visible_tracking,
                      listed(Modality::visible, options_.visible_tracking));
@@ -102,10 +102,6 @@ class Gathering {
   Result<std::vector<fs::path>> visible_sources() {
     if (!options_.visible.empty()) return listed(Modality::visible, options_.visible);
     return files_of_transforms(Modality::visible);
-  }
-  Result<std::vector<fs::path>> thermal_sources() {
-    if (!options_.thermal.empty()) return listed(Modality::thermal, options_.thermal);
-    return files_of_transforms(Modality::thermal);
   }
 
   /// A frame is of the orbit or of the way between its stations: as a copy of itself it would be

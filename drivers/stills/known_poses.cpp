@@ -24,16 +24,29 @@ fs::path resolve(const fs::path& base, const std::string& name) {
   return path;
 }
 
-Status add_transforms(const fs::path& file, std::map<Modality, KnownViews>& known,
-                      Remarks& remarks) {
+/// One name for a file however it is written, links followed.
+std::string canonical_name(const fs::path& file) {
+  std::error_code unresolved;
+  const fs::path canonical = fs::weakly_canonical(file, unresolved);
+  return (unresolved ? fs::absolute(file, unresolved).lexically_normal() : canonical).string();
+}
+
+Status add_transforms(const fs::path& file, const std::vector<fs::path>& thermal_files,
+                      std::map<Modality, KnownViews>& known, Remarks& remarks) {
   ORBITFUSE_ASSIGN(const Transforms transforms, read_transforms_json(file));
   for (const auto& [key, frames] : transforms.unused)
     remarks.add(fmt::format("{}: {} is there in {} of {} frames and is not used{}",
                             file.filename().string(), key, frames, transforms.frames.size(),
                             key == "mask_path" ? ": all of an image is taken" : ""));
+  std::set<std::string> thermal;
+  for (const fs::path& path : thermal_files) thermal.insert(canonical_name(path));
+  std::size_t thermal_frames = 0;
   for (const TransformsFrame& frame : transforms.frames) {
-    known[Modality::visible].add(
-        {resolve(file.parent_path(), frame.file_path), frame.camera, frame.cam_from_world, {}});
+    const fs::path image = resolve(file.parent_path(), frame.file_path);
+    const bool is_thermal = thermal.contains(canonical_name(image));
+    thermal_frames += is_thermal ? 1 : 0;
+    known[is_thermal ? Modality::thermal : Modality::visible].add(
+        {image, frame.camera, frame.cam_from_world, {}});
     if (frame.thermal_file_path) {
       known[Modality::thermal].add({resolve(file.parent_path(), *frame.thermal_file_path),
                                     frame.camera,
@@ -41,6 +54,9 @@ Status add_transforms(const fs::path& file, std::map<Modality, KnownViews>& know
                                     {}});
     }
   }
+  if (thermal_frames > 0)
+    remarks.add(fmt::format("{}: {} of {} frames are thermal images", file.filename().string(),
+                            thermal_frames, transforms.frames.size()));
   return {};
 }
 
@@ -58,13 +74,6 @@ Status add_colmap(const fs::path& folder, Modality modality,
 }  // namespace
 
 namespace {
-
-/// One name for a file however it is written, links followed.
-std::string canonical_name(const fs::path& file) {
-  std::error_code unresolved;
-  const fs::path canonical = fs::weakly_canonical(file, unresolved);
-  return (unresolved ? fs::absolute(file, unresolved).lexically_normal() : canonical).string();
-}
 
 /// How many parts at the ends of two paths are equal: the name, the folder above it, ...
 std::size_t common_end(const fs::path& image, const fs::path& view) {
@@ -181,33 +190,19 @@ Result<std::map<Modality, KnownViews>> read_ground_truth_views(const fs::path& f
 }
 
 Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& options,
+                                                        const std::vector<fs::path>& thermal_files,
                                                         Remarks& remarks) {
   std::map<Modality, KnownViews> known;
   if (options.ground_truth) {
     ORBITFUSE_ASSIGN(known, read_ground_truth_views(*options.ground_truth));
   }
   if (options.transforms_json)
-    ORBITFUSE_TRY(add_transforms(*options.transforms_json, known, remarks));
+    ORBITFUSE_TRY(add_transforms(*options.transforms_json, thermal_files, known, remarks));
   if (options.visible_colmap)
     ORBITFUSE_TRY(add_colmap(*options.visible_colmap, Modality::visible, known));
   if (options.thermal_colmap)
     ORBITFUSE_TRY(add_colmap(*options.thermal_colmap, Modality::thermal, known));
   return known;
-}
-
-std::size_t give_to_thermal(const std::vector<fs::path>& thermal_files,
-                            std::map<Modality, KnownViews>& known) {
-  std::set<std::string> thermal;
-  for (const fs::path& file : thermal_files) thermal.insert(canonical_name(file));
-  KnownViews visible;
-  std::size_t given = 0;
-  for (const KnownView& view : known[Modality::visible].all()) {
-    const bool is_thermal = thermal.contains(canonical_name(view.file));
-    (is_thermal ? known[Modality::thermal] : visible).add(view);
-    given += is_thermal ? 1 : 0;
-  }
-  if (given > 0) known[Modality::visible] = std::move(visible);
-  return given;
 }
 
 }  // namespace orbitfuse

@@ -53,14 +53,11 @@ class KnownViews {
 };
 
 /// Reads the sources that `options` name, visible and thermal; what they hold and nothing uses is
-/// told.
-Result<std::map<Modality, KnownViews>> read_known_poses(const ImportOptions& options,
-                                                        Remarks& remarks);
-
-/// A transforms.json says of no frame which camera took it: views of these files, given as thermal
-/// images, become thermal ones. Returns how many.
-std::size_t give_to_thermal(const std::vector<std::filesystem::path>& thermal_files,
-                            std::map<Modality, KnownViews>& known);
+/// told. A transforms.json says of no frame which camera took it: those of `thermal_files` are
+/// thermal.
+Result<std::map<Modality, KnownViews>> read_known_poses(
+    const ImportOptions& options, const std::vector<std::filesystem::path>& thermal_files,
+    Remarks& remarks);
 
 /// ground_truth.json: K, and c2w per frame, of "visible" and "thermal" (docs/formats.md).
 Result<std::map<Modality, KnownViews>> read_ground_truth_views(const std::filesystem::path& file);

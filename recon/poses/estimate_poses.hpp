@@ -109,7 +109,7 @@ struct VisibleScene {
 /// `workdir`: a folder to write in, made where it isn't there; below it "visible" (thermal views:
 /// "thermal") is written over, and holds reduced images, COLMAP's database, models and log
 /// afterwards, of failures too. Nothing reads them again: the caller may remove them. Not touched
-/// where no structure from motion runs.
+/// where neither structure from motion runs nor known poses are held against the photos.
 /// Errors: usage (options), input (no or one frame, unreadable file), device (`workdir` can't be
 /// written), unavailable (no COLMAP and no known poses), quality (no attempt held; the message
 /// lists each attempt and why; or the photos contradict the known poses as a whole), cancelled.
@@ -117,9 +117,10 @@ Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseO
                                              const std::filesystem::path& workdir,
                                              const Progress& progress);
 
-/// Thermal views: known poses; else localisation in `visible` (nullptr: none) from the orbit prior
-/// of capture order or stations, or by its rig with the visible camera; else COLMAP on the thermal
-/// views alone. Errors as above.
+/// Thermal views: known poses that `visible` (nullptr: none) doesn't contradict; else localisation
+/// in it from the orbit prior of stations or order, or by its rig with the visible camera; else
+/// COLMAP on the thermal views alone. Known poses that nothing can replace are in doubt. Errors as
+/// above.
 Result<ThermalPoses> estimate_thermal_poses(const Session& session, const VisibleScene* visible,
                                             const PoseOptions& options,
                                             const std::filesystem::path& workdir,

@@ -54,7 +54,7 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
       structure_from_motion(session, frames, options, workdir / "thermal", progress, steps);
   if (!alone && visible != nullptr && alone.error().kind == ErrorKind::unavailable)
     alone.error().found =
-        steps.front().attempt + ": " + steps.front().why + "; " + alone.error().found;
+        steps.back().attempt + ": " + steps.back().why + "; " + alone.error().found;
   if (!alone) return tl::unexpected(std::move(alone.error()));
   ModalityPoses poses = *std::move(alone);
   poses.ladder = std::move(steps);
@@ -62,12 +62,12 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
 }
 
 /// Known poses that nothing confirms and nothing can replace.
-ThermalPoses in_doubt(ModalityPoses known, const Error& why) {
+ThermalPoses in_doubt(ModalityPoses known, const std::string& why) {
   known.doubtful.clear();
   for (const PosedView& view : known.reconstruction.views)
     known.doubtful.push_back(
         {view.name, DoubtReason::undecided, "nothing confirms its known pose"});
-  known.ladder.push_back({"from the images", false, why.found, 0, known.frame_count, 0});
+  known.ladder.push_back({"from the images", false, why, 0, known.frame_count, 0});
   return {std::move(known), true};
 }
 
@@ -93,15 +93,18 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   Result<ThermalPoses> poses =
       estimated(without_known_poses(session, Modality::thermal, contradiction->true_focal), visible,
                 options, workdir, progress, {step});
-  const bool found = poses.has_value();
-  if (!found && poses.error().kind != ErrorKind::quality) return poses;
-  if (!found) poses = in_doubt(std::move(known), poses.error());
+  if (!poses && poses.error().kind == ErrorKind::cancelled) return poses;
+  // An answer in a world of its own is worth less than poses that may be right in this one.
+  const bool found = poses && poses->shares_visible_frame;
+  if (!found)
+    poses = in_doubt(std::move(known),
+                     poses ? "placed in a world of their own alone" : poses.error().found);
   poses->warnings.insert(
       poses->warnings.begin(),
       fmt::format(
-          "the known thermal poses contradict the visible scene{}: {}; correct them, or set "
-          "poses.check_known_poses = false to take them as they are",
-          found ? " and were estimated from the images instead"
+          "the visible scene doesn't confirm the known thermal poses{}: {}; correct them, or "
+          "set poses.check_known_poses = false to take them as they are",
+          found ? ", which were estimated from the images instead"
                 : ", and the images alone place no views: they are all in doubt",
           contradiction->words));
   return poses;

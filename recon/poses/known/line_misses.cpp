@@ -8,19 +8,20 @@
 
 namespace orbitfuse {
 
-std::vector<PairMisses> line_misses(const FeatureGraph& graph, const PosedFrames& posed) {
+std::vector<PairMisses> line_misses(const FeatureGraph& graph, const PairMatches& matches,
+                                    const PosedFrames& posed) {
   std::vector<PairMisses> misses;
-  for (const auto& [pair, matches] : graph.verified) {
+  for (const auto& [pair, of_pair] : matches) {
     const auto& [a, b] = pair;
     if (!posed.poses[at(a)] || !posed.poses[at(b)]) continue;
     if (camera_center(*posed.poses[at(a)]) == camera_center(*posed.poses[at(b)])) continue;
     const Camera& second = posed.cameras[at(b)];
     const double px = missed_side_px / std::max(second.width, second.height);
     const EpipolarBand band = epipolar_band(graph, pair, posed, 1 / px);
-    PairMisses of_pair{pair, {}};
-    for (const auto& [i, j] : matches)
-      of_pair.px.push_back(static_cast<float>(band.distance(i, j) / band.half_width));
-    misses.push_back(std::move(of_pair));
+    PairMisses missed{pair, {}};
+    for (const auto& [i, j] : of_pair)
+      missed.px.push_back(static_cast<float>(band.distance(i, j) / band.half_width));
+    misses.push_back(std::move(missed));
   }
   return misses;
 }

@@ -15,15 +15,16 @@ struct PairMisses {
 };
 inline constexpr double missed_side_px = 640;
 
-/// Of the pairs whose frames both have a pose. Two cameras in one place have no lines: such pairs
-/// are left out.
-std::vector<PairMisses> line_misses(const FeatureGraph& graph, const PosedFrames& posed);
+/// Of those `matches` of the graph whose frames both have a pose. Two cameras in one place have no
+/// lines: such pairs are left out.
+std::vector<PairMisses> line_misses(const FeatureGraph& graph, const PairMatches& matches,
+                                    const PosedFrames& posed);
 
 /// The matches that lie within `px`, and all of them.
 struct Held {
   std::size_t held = 0, all = 0;
   double share() const {
-    return all > 0 ? static_cast<double>(held) / static_cast<double>(all) : 1.0;
+    return all > 0 ? static_cast<double>(held) / static_cast<double>(all) : 0.0;
   }
 };
 Held held_within(const std::vector<PairMisses>& misses, double px);

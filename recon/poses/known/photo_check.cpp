@@ -45,6 +45,17 @@ std::string words_of(const Held& held, double px) {
       held.all, percent(held.share()), px, missed_side_px);
 }
 
+/// Enough pairs, spread over all, to tell a mistake of all poses by.
+PairMatches sampled(const PairMatches& matches) {
+  constexpr std::size_t enough = 150;
+  const std::size_t every = 1 + matches.size() / enough;
+  PairMatches some;
+  std::size_t index = 0;
+  for (const auto& pair : matches)
+    if (index++ % every == 0) some.insert(pair);
+  return some;
+}
+
 /// Views are left out one by one, the one first that holds least: its neighbours' matches with it
 /// speak against them no longer. Where all poses are a little off, a view is named that is more so.
 void name_wrong(const std::vector<PairMisses>& misses, int frames, PhotoJudgement& judged) {
@@ -72,8 +83,10 @@ void name_wrong(const std::vector<PairMisses>& misses, int frames, PhotoJudgemen
 
 }  // namespace
 
-PhotoJudgement judge_by_photos(const FeatureGraph& graph, const Reconstruction& given) {
-  const std::vector<PairMisses> misses = line_misses(graph, posed_frames(graph, given));
+Result<PhotoJudgement> judge_by_photos(const FeatureGraph& graph, const Reconstruction& given,
+                                       const Progress& progress) {
+  const std::vector<PairMisses> misses =
+      line_misses(graph, graph.verified, posed_frames(graph, given));
   PhotoJudgement judged;
   const Held close = held_within(misses, close_px);
   judged.matches = close.all;
@@ -86,20 +99,26 @@ PhotoJudgement judge_by_photos(const FeatureGraph& graph, const Reconstruction& 
     judged.checked = 0;
     return judged;
   }
-  const auto fine_share = [&](const std::vector<PosedView>& views) -> Result<double> {
-    Reconstruction model;
-    model.views = views;
-    return held_within(line_misses(graph, posed_frames(graph, model)), fine_px).share();
-  };
+  ORBITFUSE_TRY(progress.check("poses.visible"));
   const double fine = held_within(misses, fine_px).share();
-  if (fine < suspect_share)
-    if (const auto slip = likeliest_slip(given.views, fine_share);
-        slip && *slip && (*slip)->fit >= std::max(mended_share, fine + mended_gain))
-      judged.slip = **slip;
+  if (fine < suspect_share) {
+    const PairMatches some = sampled(graph.verified);
+    const PoseFit fine_share = [&](const std::vector<PosedView>& views) -> Result<double> {
+      ORBITFUSE_TRY(progress.check("poses.visible"));
+      Reconstruction model;
+      model.views = views;
+      return held_within(line_misses(graph, some, posed_frames(graph, model)), fine_px).share();
+    };
+    ORBITFUSE_ASSIGN(judged.slip, likeliest_slip(given.views, fine_share));
+    if (judged.slip && judged.slip->fit < std::max(mended_share, fine + mended_gain))
+      judged.slip.reset();
+  }
   name_wrong(misses, frames, judged);
-  judged.contradicted = judged.slip.has_value() ||
-                        held_within(misses, coarse_px).share() < least_share ||
-                        2 * static_cast<int>(judged.wrong.size()) > judged.checked;
+  const auto wrong = static_cast<int>(judged.wrong.size());
+  const bool most_wrong =
+      2 * wrong > judged.checked ||
+      (3 * wrong > judged.checked && held_within(misses, coarse_px).share() < least_share);
+  judged.contradicted = judged.slip || (most_wrong && 2 * judged.checked >= frames);
   return judged;
 }
 
@@ -136,9 +155,10 @@ void add_nearest(const std::vector<PosedView>& views, const std::vector<int>& fr
 /// files may be in any order.
 std::vector<ViewPair> pairs_to_check(const std::vector<const FrameRecord*>& frames,
                                      const std::vector<PosedView>& views) {
-  std::vector<ViewPair> list = orbit_pairs(frames);
-  const std::size_t most = std::max<std::size_t>(pairs_a_view * frames.size(), 28);
-  if (list.size() > most) list = nearest_pairs(frames, most);
+  const std::size_t count = frames.size(), a_fifth = count * (count - 1) / 10;
+  const std::vector<ViewPair> list =
+      count <= 8 ? exhaustive_pairs(static_cast<int>(count))
+                 : nearest_pairs(frames, std::min(a_fifth, pairs_a_view * count));
   std::set<ViewPair> pairs(list.begin(), list.end());
   std::vector<int> frame_of;
   for (const PosedView& view : views)
@@ -194,15 +214,21 @@ Status check_by_photos(const Session& session, const PoseOptions& options,
       matched(session, frames, poses.reconstruction.views, options, workdir, progress);
   ORBITFUSE_TRY(progress.check("poses.visible"));
   if (!graph) {
+    const ErrorKind kind = graph.error().kind;
+    if (kind != ErrorKind::unavailable && kind != ErrorKind::quality)
+      return tl::unexpected(graph.error());
     unchecked(graph.error().found);
     return {};
   }
-  const PhotoJudgement judged = judge_by_photos(*graph, poses.reconstruction);
+  ORBITFUSE_ASSIGN(const PhotoJudgement judged,
+                   judge_by_photos(*graph, poses.reconstruction, progress));
   poses.gates["known_poses_checked"] = judged.checked;
   if (judged.checked == 0) {
-    unchecked(fmt::format("the photos have {} matches", judged.matches));
+    unchecked(fmt::format("{} matches between photos could be judged", judged.matches));
     return {};
   }
+  if (2 * judged.checked < graph->count())
+    unchecked(fmt::format("{} of {} views have enough matches", judged.checked, graph->count()));
   poses.gates["known_poses_match_share"] = judged.share;
   poses.gates["known_poses_miss_px"] = judged.median_px;
   const std::string figures = fmt::format(

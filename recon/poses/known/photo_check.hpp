@@ -26,7 +26,9 @@ struct PhotoJudgement {
 };
 
 /// `given`: views of the graph's frames. Under a hundred matches nothing is judged (`checked` 0).
-PhotoJudgement judge_by_photos(const FeatureGraph& graph, const Reconstruction& given);
+/// Errors: cancelled.
+Result<PhotoJudgement> judge_by_photos(const FeatureGraph& graph, const Reconstruction& given,
+                                       const Progress& progress);
 
 /// Matches photos of neighbouring views and judges `poses` by them: views whose poses are wrong are
 /// dropped, others doubted, both by name; where no photo can be matched, or nothing matches, a skip

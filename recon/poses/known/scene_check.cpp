@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/geometry/narrowed.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
 #include "recon/alignment/edge_field.hpp"
@@ -39,21 +40,16 @@ constexpr double least_correlation_share = 0.45;
 constexpr int render_width_px = 160;  ///< made of keyframes, which costs a hundredth of a render
 constexpr int shift_px = 3;           ///< of such a render: half a degree of a narrow lens
 
-Camera narrow(const Camera& camera) {
-  return camera.scaled_to(render_width_px,
-                          std::max(1, camera.height * render_width_px / camera.width));
-}
-
-double turn_deg(const PosedView& a, const PosedView& b) {
-  const double w = std::abs(a.cam_from_world.rotation.dot(b.cam_from_world.rotation));
-  return 2 * std::acos(std::min(w, 1.0)) * 180 / EIGEN_PI;
-}
+/// Patches without which alignment leaves a view where it was.
+constexpr int least_matches = 12;
 
 /// The images of views that are turned away from one, spread evenly over them.
 std::vector<std::size_t> controls_of(const std::vector<PosedView>& views, std::size_t view) {
   std::vector<std::size_t> turned;
   for (std::size_t i = 0; i < views.size(); ++i)
-    if (i != view && turn_deg(views[i], views[view]) >= control_turn_deg) turned.push_back(i);
+    if (i != view && rotation_angle_deg(views[i].cam_from_world.rotation,
+                                        views[view].cam_from_world.rotation) >= control_turn_deg)
+      turned.push_back(i);
   if (turned.size() <= most_controls) return turned;
   std::vector<std::size_t> chosen;
   for (std::size_t c = 0; c < most_controls; ++c)
@@ -64,11 +60,15 @@ std::vector<std::size_t> controls_of(const std::vector<PosedView>& views, std::s
 /// Fewer images than that are no choice.
 constexpr std::size_t least_controls = 3;
 
-/// How many other images fit the render from a view's place as well as its own does.
-Result<int> rivals(const SceneRenderer& scene, const std::vector<cv::Mat>& fields,
-                   const std::vector<PosedView>& views, std::size_t view) {
-  ORBITFUSE_ASSIGN(const SceneRender seen,
-                   scene(narrow(views[view].camera), views[view].cam_from_world));
+/// Whether a view's own image fits the render from its place better than others do: a place that
+/// shows nothing fits none. Nothing where there are too few others to choose from.
+Result<std::optional<bool>> own_is_best(const SceneRenderer& scene,
+                                        const std::vector<cv::Mat>& fields,
+                                        const std::vector<PosedView>& views, std::size_t view) {
+  const std::vector<std::size_t> controls = controls_of(views, view);
+  if (controls.size() < least_controls) return std::optional<bool>();
+  ORBITFUSE_ASSIGN(const SceneRender seen, scene(narrowed_to(views[view].camera, render_width_px),
+                                                 views[view].cam_from_world));
   const cv::Mat edges = rendered_edges(seen);
   const auto fit = [&](std::size_t image) {
     return fields[image].size() == edges.size()
@@ -76,56 +76,80 @@ Result<int> rivals(const SceneRenderer& scene, const std::vector<cv::Mat>& field
                : -1.0;
   };
   const double own = fit(view);
-  int as_good = 0;
-  for (const std::size_t other : controls_of(views, view)) as_good += fit(other) >= own ? 1 : 0;
-  return as_good;
+  return std::optional(std::none_of(controls.begin(), controls.end(),
+                                    [&](std::size_t other) { return fit(other) >= own; }));
 }
 
-/// Of each view, or each `every`th, whether its own image is the best one for its place. A place
-/// that shows nothing is none.
-Result<std::vector<bool>> own_is_best(const SceneRenderer& scene,
-                                      const std::vector<cv::Mat>& fields,
-                                      const std::vector<PosedView>& views, const Progress& progress,
-                                      std::size_t every = 1) {
-  std::vector<bool> best;
+using Ranks = std::vector<std::optional<bool>>;
+
+/// Of each view, or each `every`th.
+Result<Ranks> ranks_of(const SceneRenderer& scene, const std::vector<cv::Mat>& fields,
+                       const std::vector<PosedView>& views, const Progress& progress,
+                       std::size_t every = 1) {
+  Ranks ranks;
   for (std::size_t v = 0; v < views.size(); v += every) {
     ORBITFUSE_TRY(progress.check("poses.thermal"));
-    ORBITFUSE_ASSIGN(const int as_good, rivals(scene, fields, views, v));
-    best.push_back(as_good == 0);
+    ORBITFUSE_ASSIGN(const std::optional<bool> best, own_is_best(scene, fields, views, v));
+    ranks.push_back(best);
   }
-  return best;
+  return ranks;
 }
 
-bool comparable(const std::vector<PosedView>& views) {
-  std::size_t with_controls = 0;
-  for (std::size_t v = 0; v < views.size(); ++v)
-    with_controls += controls_of(views, v).size() >= least_controls ? 1 : 0;
-  return 2 * with_controls >= views.size();
+std::ptrdiff_t judged_among(const Ranks& ranks) {
+  return std::count_if(ranks.begin(), ranks.end(), [](const auto& r) { return r.has_value(); });
+}
+std::ptrdiff_t best_among(const Ranks& ranks) {
+  return std::count(ranks.begin(), ranks.end(), std::optional(true));
+}
+double share_best(const Ranks& ranks) {
+  return static_cast<double>(best_among(ranks)) /
+         static_cast<double>(std::max<std::ptrdiff_t>(judged_among(ranks), 1));
 }
 
-Result<double> median_apart_deg(const SceneRenderer& scene, const OrbitViews& orbit,
-                                const std::vector<PosedView>& views, const Progress& progress) {
+/// Views that one lens took: alignment takes the first one's for all.
+std::vector<std::vector<std::size_t>> by_lens(const std::vector<PosedView>& views) {
+  std::vector<std::vector<std::size_t>> groups;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const auto same = std::find_if(groups.begin(), groups.end(), [&](const auto& group) {
+      return views[group.front()].camera == views[v].camera;
+    });
+    if (same == groups.end())
+      groups.push_back({v});
+    else
+      same->push_back(v);
+  }
+  return groups;
+}
+
+/// Nothing where alignment finds too little in most views.
+Result<std::optional<double>> median_apart_deg(const SceneRenderer& scene, const OrbitViews& orbit,
+                                               const std::vector<PosedView>& views,
+                                               const Progress& progress) {
   RenderAlignmentOptions alone;
   alone.focal_relative_sigma = 0;
   alone.rounds = wide_rounds();
-  ORBITFUSE_ASSIGN(const Fit placed,
-                   align_with_renders(scene, orbit.images, views, alone, progress));
   std::vector<double> apart;
-  for (std::size_t v = 0; v < views.size(); ++v)
-    apart.push_back(apart_deg(orbit, views[v].cam_from_world, placed.views[v].view.cam_from_world));
-  return median(apart);
-}
-
-double share_of(const std::vector<bool>& best) {
-  return static_cast<double>(std::count(best.begin(), best.end(), true)) /
-         static_cast<double>(best.size());
+  for (const std::vector<std::size_t>& group : by_lens(views)) {
+    std::vector<cv::Mat> images;
+    std::vector<PosedView> of_group;
+    for (const std::size_t v : group)
+      images.push_back(orbit.images[v]), of_group.push_back(views[v]);
+    ORBITFUSE_ASSIGN(const Fit placed,
+                     align_with_renders(scene, images, of_group, alone, progress));
+    for (std::size_t i = 0; i < group.size(); ++i)
+      if (placed.views[i].matches >= least_matches)
+        apart.push_back(
+            apart_deg(orbit, of_group[i].cam_from_world, placed.views[i].view.cam_from_world));
+  }
+  if (2 * apart.size() < views.size()) return std::optional<double>();
+  return std::optional(median(apart));
 }
 
 /// Of each image with what those views paint whose own image is the best.
 Result<std::vector<std::optional<double>>> correlations(const SceneRenderer& scene,
                                                         const std::vector<cv::Mat>& images,
                                                         const std::vector<PosedView>& views,
-                                                        const std::vector<bool>& best,
+                                                        const Ranks& ranks,
                                                         const Progress& progress) {
   PaintedSceneOptions painting;
   painting.width_px = render_width_px;
@@ -133,7 +157,7 @@ Result<std::vector<std::optional<double>>> correlations(const SceneRenderer& sce
   std::vector<PosedView> painters;
   std::vector<cv::Mat> painted_images;
   for (std::size_t v = 0; v < views.size(); ++v)
-    if (best[v]) painters.push_back(views[v]), painted_images.push_back(images[v]);
+    if (ranks[v].value_or(false)) painters.push_back(views[v]), painted_images.push_back(images[v]);
   ORBITFUSE_ASSIGN(const SceneRenderer painted,
                    painted_scene(scene, painters, painted_images, painting, progress));
   std::vector<std::optional<double>> result;
@@ -144,31 +168,28 @@ Result<std::vector<std::optional<double>>> correlations(const SceneRenderer& sce
   return result;
 }
 
-void name_wrong(const std::vector<bool>& best,
-                const std::vector<std::optional<double>>& correlations, SceneJudgement& judged) {
+void name_wrong(const Ranks& ranks, const std::vector<std::optional<double>>& correlations,
+                SceneJudgement& judged) {
   std::vector<double> known;
   for (const auto& correlation : correlations)
     if (correlation) known.push_back(*correlation);
   judged.median_correlation = median(known);
-  for (std::size_t v = 0; v < best.size(); ++v) {
-    const bool unlike =
-        !(correlations[v].value_or(-1) >= least_correlation_share * judged.median_correlation);
+  for (std::size_t v = 0; v < ranks.size(); ++v) {
+    const bool best = ranks[v].value_or(true);
+    const bool unlike = correlations[v] &&
+                        !(*correlations[v] >= least_correlation_share * judged.median_correlation);
+    const std::string better =
+        "another view's image fits the scene from its known pose better than its own";
     const std::string like =
-        correlations[v] ? fmt::format(
-                              "its image correlates with what the others measured there at {:.2f}, "
-                              "the median view's at {:.2f}",
-                              *correlations[v], judged.median_correlation)
-                        : "nothing that the others measured is seen from there";
-    if (best[v] && !unlike) continue;
-    if (best[v])
-      judged.doubtful.emplace_back(v, like + ": look at its known pose");
-    else if (!unlike)
-      judged.doubtful.emplace_back(
-          v, "another view's image fits the scene from its known pose better: look at that");
-    else
-      judged.wrong.emplace_back(
-          v, "another view's image fits the scene from its known pose better, and " + like +
-                 ": correct it");
+        unlike ? fmt::format(
+                     "its image correlates with what the others measured there at {:.2f}, "
+                     "the median view's at {:.2f}",
+                     *correlations[v], judged.median_correlation)
+               : "";
+    if (!best && unlike)
+      judged.wrong.emplace_back(v, better + ", and " + like + ": correct that pose");
+    else if (!best || unlike)
+      judged.doubtful.emplace_back(v, (best ? like : better) + ": look at that pose");
   }
 }
 
@@ -179,30 +200,31 @@ Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene, const OrbitVie
                                       const Progress& progress) {
   const TraceSpan span("check known poses");
   SceneJudgement judged;
-  if (views.size() < least_views_to_judge || !comparable(views)) return judged;
-  judged.views = static_cast<int>(views.size());
+  if (views.size() < least_views_to_judge) return judged;
   std::vector<cv::Mat> fields;
   for (std::size_t v = 0; v < views.size(); ++v)
-    fields.push_back(edges_at(orbit.images[v], narrow(views[v].camera)));
-  ORBITFUSE_ASSIGN(const std::vector<bool> best, own_is_best(scene, fields, views, progress));
-  judged.best_of_all = static_cast<int>(std::count(best.begin(), best.end(), true));
-  if (share_of(best) < believed_share) {
+    fields.push_back(edges_at(orbit.images[v], narrowed_to(views[v].camera, render_width_px)));
+  ORBITFUSE_ASSIGN(const Ranks ranks, ranks_of(scene, fields, views, progress));
+  const auto count = static_cast<std::ptrdiff_t>(views.size());
+  if (2 * judged_among(ranks) < count) return judged;
+  judged.views = static_cast<int>(judged_among(ranks));
+  judged.best_of_all = static_cast<int>(best_among(ranks));
+  if (share_best(ranks) < believed_share) {
     judged.contradicted = true;
     const std::size_t every = std::max<std::size_t>(1, views.size() / views_to_try_slips);
     const PoseFit fit = [&](const std::vector<PosedView>& mended) -> Result<double> {
-      ORBITFUSE_ASSIGN(const std::vector<bool> then,
-                       own_is_best(scene, fields, mended, progress, every));
-      return share_of(then);
+      ORBITFUSE_ASSIGN(const Ranks then, ranks_of(scene, fields, mended, progress, every));
+      return share_best(then);
     };
     ORBITFUSE_ASSIGN(judged.slip, likeliest_slip(views, fit));
     if (judged.slip && judged.slip->fit < mended_share) judged.slip.reset();
     return judged;
   }
   ORBITFUSE_ASSIGN(judged.median_apart_deg, median_apart_deg(scene, orbit, views, progress));
-  ORBITFUSE_ASSIGN(const auto like, correlations(scene, orbit.images, views, best, progress));
-  name_wrong(best, like, judged);
-  judged.contradicted =
-      judged.median_apart_deg > believed_apart_deg || 2 * judged.wrong.size() > views.size();
+  ORBITFUSE_ASSIGN(const auto like, correlations(scene, orbit.images, views, ranks, progress));
+  name_wrong(ranks, like, judged);
+  judged.contradicted = judged.median_apart_deg.value_or(0) > believed_apart_deg ||
+                        2 * judged.wrong.size() > views.size();
   return judged;
 }
 
@@ -215,9 +237,9 @@ std::string words_of(const SceneJudgement& judged) {
   if (judged.slip)
     return words + fmt::format("; it looks as if {}: {:.0f} % would then do", judged.slip->words,
                                100 * judged.slip->fit);
-  if (judged.median_apart_deg > 0)
+  if (judged.median_apart_deg)
     words += fmt::format("; the views' edges place them {:.1f} deg aside in the median",
-                         judged.median_apart_deg);
+                         *judged.median_apart_deg);
   return words;
 }
 
@@ -257,9 +279,10 @@ Result<std::optional<Contradiction>> check_by_scene(const Session& session,
     const auto frame =
         std::find_if(session.frames.begin(), session.frames.end(),
                      [&](const FrameRecord& record) { return record.file == view.name; });
-    ORBITFUSE_ASSIGN(cv::Mat image, straight_luminance(session, *frame, view.camera));
-    orbit.images.push_back(std::move(image));
-    view.camera = view.camera.without_distortion();
+    ORBITFUSE_TRY(progress.check("poses.thermal"));
+    ORBITFUSE_ASSIGN(const cv::Mat image, straight_luminance(session, *frame, view.camera));
+    view.camera = narrowed_to(view.camera.without_distortion(), render_width_px);
+    orbit.images.push_back(reduced_to(image, view.camera));
   }
   ORBITFUSE_ASSIGN(const SceneRenderer scene,
                    scene_of(visible, orbit.canonical_from_world, progress));
@@ -267,15 +290,15 @@ Result<std::optional<Contradiction>> check_by_scene(const Session& session,
   poses.gates["known_poses_checked"] = judged.views;
   if (judged.views == 0) return unchecked("all views look the same way");
   poses.gates["known_poses_best_of_all"] = judged.best_of_all;
-  poses.gates["known_poses_apart_deg"] = judged.median_apart_deg;
+  if (judged.median_apart_deg) poses.gates["known_poses_apart_deg"] = *judged.median_apart_deg;
   const std::string figures = words_of(judged);
   if (judged.contradicted)
     return std::optional(Contradiction{figures, judged.slip ? judged.slip->true_focal : 1});
-  if (judged.median_apart_deg > precise_apart_deg)
+  if (judged.median_apart_deg.value_or(0) > precise_apart_deg)
     poses.warnings.push_back(
         fmt::format("the known thermal poses are imprecise: their edges place the views {:.1f} deg "
                     "aside in the median, of right poses half a degree",
-                    judged.median_apart_deg));
+                    *judged.median_apart_deg));
   poses.ladder.back().why += "; " + figures;
   take(judged, given, poses);
   return believed;

@@ -20,8 +20,9 @@ struct SceneJudgement {
   int views = 0;        ///< judged: all or, of few, none
   int best_of_all = 0;  ///< whose own image fits the render from there better than any other one
   /// From the given poses to where the views' edges place them in the scene: of the centre as seen
-  /// from the orbit's middle, or of the turn if that is larger.
-  double median_apart_deg = 0;
+  /// from the orbit's middle, or of the turn if that is larger. Nothing where few have enough
+  /// edges.
+  std::optional<double> median_apart_deg;
   double median_correlation = 0;  ///< of an image with what the others' temperatures paint there
   bool contradicted = false;      ///< the poses as a whole
   std::optional<Slip> slip;       ///< that would explain it; its fit: the share best of all

@@ -100,7 +100,7 @@ Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
   poses.gates["posed_ratio"] = poses.posed_ratio();
   poses.skips.push_back({fmt::format("{} pose estimation", name(modality)),
                          fmt::format("the session carries {} poses", posed),
-                         "no structure from motion; poses are as trusted as their source"});
+                         "no structure from motion"});
   return poses;
 }
 
@@ -108,17 +108,18 @@ Session without_known_poses(Session session, Modality modality, double true_foca
   constexpr double told_sigma = 0.05;
   for (FrameRecord& frame : session.frames) {
     if (frame.modality != modality) continue;
-    const std::optional<Camera> camera = known_camera(session, frame);
-    for (DeviceInfo& device : session.devices)
-      if (device.id == frame.device && camera && !device.lens.focal_px) {
-        device.lens.focal_px = true_focal * camera->fx;
-        device.lens.focal_relative_sigma = told_sigma;
-      }
+    for (DeviceInfo& device : session.devices) {
+      if (device.id != frame.device || !frame.camera) continue;
+      // A calibration of another source stays.
+      if (calibrated_camera(session, device.id, frame.width, frame.height) == frame.camera)
+        device.lens.calibrated.reset();
+      if (device.lens.calibrated || device.lens.focal_px) continue;
+      device.lens.focal_px = true_focal * frame.camera->fx;
+      device.lens.focal_relative_sigma = told_sigma;
+    }
     frame.camera.reset();
     frame.cam_from_world.reset();
   }
-  for (DeviceInfo& device : session.devices)
-    if (device.modality == modality) device.lens.calibrated.reset();
   return session;
 }
 

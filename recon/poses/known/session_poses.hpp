@@ -14,8 +14,8 @@ bool has_known_poses(const Session& session, Modality modality);
 /// The posed frames in the session's world; those without a pose are named in `dropped`.
 Result<ModalityPoses> known_poses(const Session& session, Modality modality);
 
-/// As if the modality's poses had not been given; of its lenses the focal length is left, times
-/// `true_focal`, as what a user says of it, since what came with wrong poses may be wrong as well.
+/// As if the modality's poses had not been given; of the cameras that came with them the focal
+/// length is left, times `true_focal`, as what a user says of it, since it may be wrong as well.
 Session without_known_poses(Session session, Modality modality, double true_focal);
 
 }  // namespace orbitfuse

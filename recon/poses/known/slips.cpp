@@ -32,23 +32,26 @@ Views with_focal(Views views, double factor) {
   return views;
 }
 
-/// The focal length that fits best, as a factor of the given one.
+/// The focal length that fits best, as a factor of the given one: where several fit equally well,
+/// the one in their middle.
 Result<Slip> other_focal(const Views& given, double given_fit, const PoseFit& fit) {
   constexpr double widest = 16, step = 1.12, finest = 1.004;
-  double best_factor = 1, best = given_fit;
+  double best = given_fit, low = 1, high = 1;
   const auto look = [&](double factor) -> Status {
     ORBITFUSE_ASSIGN(const double found, fit(with_focal(given, factor)));
-    if (found > best) best = found, best_factor = factor;
+    if (found > best) best = found, low = high = factor;
+    if (found == best) low = std::min(low, factor), high = std::max(high, factor);
     return {};
   };
   for (double factor = 1 / widest; factor <= widest; factor *= step) ORBITFUSE_TRY(look(factor));
   for (double ratio = std::sqrt(step); ratio > finest; ratio = std::sqrt(ratio)) {
-    const double middle = best_factor;
-    ORBITFUSE_TRY(look(middle * ratio));
-    ORBITFUSE_TRY(look(middle / ratio));
+    const double lowest = low, highest = high;
+    ORBITFUSE_TRY(look(highest * ratio));
+    ORBITFUSE_TRY(look(lowest / ratio));
   }
-  return Slip{fmt::format("the focal length is {:.3g} times what it should be", 1 / best_factor),
-              best, best_factor};
+  const double factor = std::sqrt(low * high);
+  return Slip{fmt::format("the focal length is {:.3g} times what it should be", 1 / factor), best,
+              factor};
 }
 
 }  // namespace

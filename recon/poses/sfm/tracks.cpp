@@ -215,6 +215,7 @@ PosedFrames posed_frames(const FeatureGraph& graph, const Reconstruction& model)
     lens[{graph.frames[at(f)]->device, camera.width, camera.height}] = camera;
   }
   for (int f = 0; f < graph.count(); ++f) {
+    if (posed.poses[at(f)]) continue;
     Camera& camera = posed.cameras[at(f)];
     const auto known = lens.find({graph.frames[at(f)]->device, camera.width, camera.height});
     if (known != lens.end()) camera = known->second;

@@ -243,8 +243,10 @@ TEST_F(Run, ResultsOfAnotherSessionAreKeptUnlessForcedAndThenGoWhole) {
     ASSERT_TRUE(write_file_atomic(out / file, "{}"));
   const Outcome forced = run({"--force"}, {}, "poses");
   EXPECT_EQ(forced.code, 0) << forced.err;
-  EXPECT_THAT(forced.out, HasSubstr("are removed first: poses_visible, poses_thermal; what else "
-                                    "lies there stays: measurements.json, mine"));
+  EXPECT_THAT(
+      forced.out,
+      HasSubstr("are removed first: poses_visible, depth, train_visible, poses_thermal; what else "
+                "lies there stays: measurements.json, mine"));
   EXPECT_TRUE(fs::exists(out / "mine/stage.json"));
   EXPECT_FALSE(fs::exists(out / "poses_thermal")) << "would be taken for this session's";
   EXPECT_EQ(states(run({}, {}, "poses")).at("poses_visible"), "unchanged");

@@ -98,7 +98,8 @@ TEST_F(KnownPoses, FramesOfThermalImagesGivenAsSuchAreThermal) {
     EXPECT_EQ(report->visible, 2);
     EXPECT_EQ(report->thermal, 2);
     EXPECT_EQ(report->with_pose, 4);
-    EXPECT_THAT(report->warnings, test::one_says("2 of the poses given are of thermal images"));
+    EXPECT_THAT(report->warnings,
+                test::one_says("transforms.json: 2 of 4 frames are thermal images"));
     for (const FrameRecord& frame : report->session.frames) {
       ASSERT_TRUE(frame.cam_from_world);
       const double place = frame.cam_from_world->translation.x();

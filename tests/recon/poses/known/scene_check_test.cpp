@@ -114,6 +114,7 @@ TEST(WithoutKnownPoses, LeaveTheFocalLengthAsAUserWouldTellIt) {
   FrameRecord frame;
   frame.modality = Modality::thermal, frame.device = "thermal0";
   frame.width = 640, frame.height = 480;
+  frame.camera = device.lens.calibrated;
   frame.cam_from_world = Rigid3d{};
   session.frames.push_back(frame);
   const Session without = without_known_poses(session, Modality::thermal, 0.5);
@@ -124,6 +125,9 @@ TEST(WithoutKnownPoses, LeaveTheFocalLengthAsAUserWouldTellIt) {
   EXPECT_GT(without.devices[0].lens.focal_relative_sigma, 0);
   const Session other = without_known_poses(session, Modality::visible, 0.5);
   EXPECT_TRUE(other.devices[0].lens.calibrated) << "the other modality's stay";
+  session.frames[0].camera->fx = 900;
+  const Session separate = without_known_poses(session, Modality::thermal, 0.5);
+  EXPECT_TRUE(separate.devices[0].lens.calibrated) << "it didn't come with the poses";
 }
 
 }  // namespace
