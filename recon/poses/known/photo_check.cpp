@@ -57,9 +57,10 @@ PairMatches sampled(const PairMatches& matches) {
 }
 
 /// Views are left out one by one, the one first that holds least: its neighbours' matches with it
-/// speak against them no longer. Where all poses are a little off, a view is named that is more so.
-void name_wrong(const std::vector<PairMisses>& misses, int frames, PhotoJudgement& judged) {
-  const double all_off = std::max(1.0, judged.median_px / precise_px);
+/// speak against them no longer. Where all poses are a little off (`all_off`: times what is
+/// precise), a view is named that is more so.
+void name_wrong(const std::vector<PairMisses>& misses, int frames, double all_off,
+                PhotoJudgement& judged) {
   std::vector<bool> without(at(frames), false);
   const auto fewer = [&](const Held& held, double share) {
     return held.all >= least_of_view && held.share() < share;
@@ -113,11 +114,11 @@ Result<PhotoJudgement> judge_by_photos(const FeatureGraph& graph, const Reconstr
     if (judged.slip && judged.slip->fit < std::max(mended_share, fine + mended_gain))
       judged.slip.reset();
   }
-  name_wrong(misses, frames, judged);
+  const bool not_theirs = held_within(misses, coarse_px).share() < least_share;
+  name_wrong(misses, frames, not_theirs ? 1 : std::max(1.0, judged.median_px / precise_px), judged);
   const auto wrong = static_cast<int>(judged.wrong.size());
-  const bool most_wrong =
-      2 * wrong > judged.checked ||
-      (3 * wrong > judged.checked && held_within(misses, coarse_px).share() < least_share);
+  // Of three views one wrong one spoils two pairs of three.
+  const bool most_wrong = 2 * wrong > judged.checked || (not_theirs && 3 * wrong > judged.checked);
   judged.contradicted = judged.slip || (most_wrong && 2 * judged.checked >= frames);
   return judged;
 }

@@ -106,6 +106,16 @@ TEST(PhotoCheck, PosesOfAnotherSceneAreContradictedThoughNoMistakeExplainsThem) 
   EXPECT_FALSE(judged.slip);
 }
 
+TEST(PhotoCheck, PosesInAnOrderOfTheirOwnAreContradictedThoughNoUsualMistake) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  Reconstruction shifted = given(scene);
+  for (std::size_t v = 0; v < 24; ++v)
+    shifted.views[v].cam_from_world = scene.truth[(v * 5 + 1) % 24].cam_from_world;
+  const PhotoJudgement judged = judge(scene, shifted);
+  EXPECT_TRUE(judged.contradicted);
+  EXPECT_FALSE(judged.slip);
+}
+
 TEST(PhotoCheck, PosesThatAreAllALittleOffAreImpreciseAndNoneIsNamed) {
   const FeatureScene scene = testing_orbit::described_scene();
   Reconstruction off = given(scene);
