@@ -15,7 +15,7 @@ WITHOUT_PLOT = {
     "cuda.md": "two machines side by side, six rows",
     "fuzzing.md": "runs of a fuzzer measure how fast a parser is",
     "hostile.md": "says what the program answers",
-    "known_poses.md": "mistakes that are seen or not",
+    "input/known_poses.md": "mistakes that are seen or not",
     "run_real.md": "what came of four recordings, without truth",
     "stability.md": "cases that hold or don't",
 }

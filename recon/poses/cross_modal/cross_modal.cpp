@@ -13,10 +13,10 @@
 #include "recon/poses/cross_modal/edge_lines.hpp"
 #include "recon/poses/cross_modal/orbit_frames.hpp"
 #include "recon/poses/cross_modal/orbit_selection.hpp"
-#include "recon/poses/cross_modal/scene_views.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
 #include "recon/poses/cross_modal/view_recovery.hpp"
 #include "recon/poses/cross_modal/view_verdicts.hpp"
+#include "recon/poses/scene_views.hpp"
 #include "recon/poses/thermal_lens.hpp"
 #include "recon/poses/world_frame.hpp"
 

@@ -16,7 +16,7 @@ namespace {
 
 /// Right poses of seven scenes hold 0.72 and more of every view's matches within the second, wrong
 /// ones (turned by 5 degrees, a tenth of the distance aside, exchanged) 0.26 at most; within the
-/// third those hold 0.52 at most (docs/benchmarks/known_poses.md).
+/// third those hold 0.52 at most (docs/benchmarks/input/known_poses.md).
 constexpr double fine_px = 2, close_px = 4, coarse_px = 8;
 /// Beyond, a match is a false one whatever the poses are.
 constexpr double false_px = 16;

@@ -14,7 +14,7 @@
 #include "recon/alignment/whole_view.hpp"
 #include "recon/poses/cross_modal/orbit_refinement.hpp"
 #include "recon/poses/cross_modal/painted_scene.hpp"
-#include "recon/poses/cross_modal/scene_views.hpp"
+#include "recon/poses/scene_views.hpp"
 #include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
@@ -27,7 +27,7 @@ constexpr std::size_t views_to_try_slips = 12;
 /// A view turned by less shows nearly the same.
 constexpr double control_turn_deg = 10;
 /// Right poses of seven scenes make every view's own image the best one, poses in another world one
-/// of 24, a focal length 1.3 times too long fewer than half (docs/benchmarks/known_poses.md).
+/// of 24, a focal length 1.3 times too long fewer than half (docs/benchmarks/input/known_poses.md).
 constexpr double believed_share = 0.5, mended_share = 0.75;
 /// Where the views' edges place them: right poses of seven scenes 0.70 degrees aside in the median
 /// at most, of a focal length 2 % too long 1.1 and more, 5 % too long 2.6, of a world turned by 5

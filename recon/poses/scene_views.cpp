@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/cross_modal/scene_views.hpp"
+#include "recon/poses/scene_views.hpp"
 
 #include <algorithm>
 
