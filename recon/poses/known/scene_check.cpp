@@ -28,7 +28,7 @@ constexpr std::size_t views_to_try_slips = 12;
 constexpr double control_turn_deg = 10;
 /// Right poses of seven scenes make every view's own image the best one, poses in another world one
 /// of 24, a focal length 1.3 times too long fewer than half (docs/benchmarks/input/known_poses.md).
-constexpr double believed_share = 0.5, mended_share = 0.75;
+constexpr double believed_share = 0.5, explained_share = 0.75;
 /// Where the views' edges place them: right poses of seven scenes 0.70 degrees aside in the median
 /// at most, of a focal length 2 % too long 1.1 and more, 5 % too long 2.6, of a world turned by 5
 /// degrees or a tenth too large 4.2.
@@ -217,7 +217,7 @@ Result<SceneJudgement> judge_by_scene(const SceneRenderer& scene, const OrbitVie
       return share_best(then);
     };
     ORBITFUSE_ASSIGN(judged.slip, likeliest_slip(views, fit));
-    if (judged.slip && judged.slip->fit < mended_share) judged.slip.reset();
+    if (judged.slip && judged.slip->fit < explained_share) judged.slip.reset();
     return judged;
   }
   ORBITFUSE_ASSIGN(judged.median_apart_deg, median_apart_deg(scene, orbit, views, progress));
