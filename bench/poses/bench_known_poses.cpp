@@ -144,6 +144,10 @@ Status run(const fs::path& folder, const fs::path& truth, const fs::path& earlie
   ORBITFUSE_ASSIGN(scenes::Scene scene, scenes::run_scene(folder, truth));
   const Modality modality = earlier.empty() ? Modality::visible : Modality::thermal;
   const std::vector<std::string> files = files_of(scene, modality);
+  constexpr std::size_t least_files = 6;  // to exchange and turn single ones among
+  if (files.size() < least_files)
+    return fail(ErrorKind::input, truth.string(),
+                fmt::format("{} {} poses", files.size(), name(modality)), "give six or more");
   const auto kinds = scenes::spoilt_poses(static_cast<int>(files.size()), modality);
   if (earlier.empty()) {
     print_rows(folder.string(), kinds, [&](const scenes::SpoiltPoses& spoilt) {

@@ -1,21 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "bench/poses/spoilt_poses.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <numbers>
 #include <random>
 #include <utility>
 
+#include "core/numeric/angle_units.hpp"
+#include "core/numeric/median.hpp"
 #include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse::scenes {
 namespace {
 
 using Views = std::vector<PosedView>;
-
-constexpr double radians = std::numbers::pi / 180;
 
 double median_distance(const Views& views) {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -24,13 +21,12 @@ double median_distance(const Views& views) {
   std::vector<double> distances;
   for (const PosedView& view : views)
     distances.push_back((camera_center(view.cam_from_world) - middle).norm());
-  std::nth_element(distances.begin(), distances.begin() + distances.size() / 2, distances.end());
-  return distances[distances.size() / 2];
+  return median(std::move(distances));
 }
 
 /// In its own axes.
 void turn(PosedView& view, const Eigen::Vector3d& axis, double angle_deg) {
-  const Rigid3d turned{Eigen::Quaterniond(Eigen::AngleAxisd(angle_deg * radians, axis)),
+  const Rigid3d turned{Eigen::Quaterniond(Eigen::AngleAxisd(angle_deg * radians_per_degree, axis)),
                        Eigen::Vector3d::Zero()};
   view.cam_from_world = turned * view.cam_from_world;
 }
@@ -70,17 +66,17 @@ void jitter(Views& views, double degrees, double share) {
 /// Into a world turned about the views' mean up, and of another size, about the middle.
 void move_all(Views& views, double turn_deg, double scale) {
   const Similarity3d canonical = canonical_from_world(views, {});
-  const Similarity3d move{
-      scale, Eigen::Quaterniond(Eigen::AngleAxisd(turn_deg * radians, Eigen::Vector3d::UnitZ())),
-      Eigen::Vector3d::Zero()};
+  const Similarity3d move{scale,
+                          Eigen::Quaterniond(Eigen::AngleAxisd(turn_deg * radians_per_degree,
+                                                               Eigen::Vector3d::UnitZ())),
+                          Eigen::Vector3d::Zero()};
   const Similarity3d new_from_old = canonical.inverse() * move * canonical;
   for (PosedView& view : views) {
     view.cam_from_world = rebase(view.cam_from_world, new_from_old);
   }
 }
 
-/// A world seen in a mirror has left-handed poses; readers that mend the handedness alone make
-/// these of them.
+/// The axes of OpenGL's cameras for those of OpenCV's.
 void flip_axes(Views& views) {
   for (PosedView& view : views) turn(view, Eigen::Vector3d::UnitX(), 180);
 }

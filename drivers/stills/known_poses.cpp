@@ -71,10 +71,6 @@ Status add_colmap(const fs::path& folder, Modality modality,
   return {};
 }
 
-}  // namespace
-
-namespace {
-
 /// How many parts at the ends of two paths are equal: the name, the folder above it, ...
 std::size_t common_end(const fs::path& image, const fs::path& view) {
   std::error_code unresolved;

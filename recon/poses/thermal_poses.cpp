@@ -63,7 +63,6 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
 
 /// Known poses that nothing confirms and nothing can replace.
 ThermalPoses in_doubt(ModalityPoses known, const std::string& why) {
-  known.doubtful.clear();
   for (const PosedView& view : known.reconstruction.views)
     known.doubtful.push_back(
         {view.name, DoubtReason::undecided, "nothing confirms its known pose"});

@@ -74,12 +74,12 @@ void name_wrong(const std::vector<PairMisses>& misses, int frames, double all_of
         worst = f;
     if (worst < 0) break;
     without[at(worst)] = true;
-    judged.wrong.emplace_back(worst, words_of(held[at(worst)], coarse_px * all_off));
+    judged.wrong.emplace_back(at(worst), words_of(held[at(worst)], coarse_px * all_off));
   }
   const std::vector<Held> held = held_by_frame(misses, close_px * all_off, frames, without);
   for (int f = 0; f < frames; ++f)
     if (!without[at(f)] && fewer(held[at(f)], doubtful_share))
-      judged.doubtful.emplace_back(f, words_of(held[at(f)], close_px * all_off));
+      judged.doubtful.emplace_back(at(f), words_of(held[at(f)], close_px * all_off));
 }
 
 }  // namespace
@@ -126,8 +126,7 @@ Result<PhotoJudgement> judge_by_photos(const FeatureGraph& graph, const Reconstr
 namespace {
 
 /// Each view with those that look most nearly the same way from most nearly the same place.
-void add_nearest(const std::vector<PosedView>& views, const std::vector<int>& frame_of,
-                 std::set<ViewPair>& pairs) {
+void add_nearest(const std::vector<PosedView>& views, std::set<ViewPair>& pairs) {
   std::vector<Eigen::Vector3d> centers;
   Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()),
                   high = -low;
@@ -148,7 +147,7 @@ void add_nearest(const std::vector<PosedView>& views, const std::vector<int>& fr
     const std::size_t most = std::min(nearest_by_pose, near.size());
     std::partial_sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(most), near.end());
     for (std::size_t n = 0; n < most; ++n)
-      pairs.insert(std::minmax(frame_of[v], frame_of[near[n].second]));
+      pairs.insert(std::minmax(static_cast<int>(v), static_cast<int>(near[n].second)));
   }
 }
 
@@ -161,19 +160,14 @@ std::vector<ViewPair> pairs_to_check(const std::vector<const FrameRecord*>& fram
       count <= 8 ? exhaustive_pairs(static_cast<int>(count))
                  : nearest_pairs(frames, std::min(a_fifth, pairs_a_view * count));
   std::set<ViewPair> pairs(list.begin(), list.end());
-  std::vector<int> frame_of;
-  for (const PosedView& view : views)
-    frame_of.push_back(static_cast<int>(
-        std::find_if(frames.begin(), frames.end(),
-                     [&](const FrameRecord* frame) { return frame->file == view.name; }) -
-        frames.begin()));
-  add_nearest(views, frame_of, pairs);
+  add_nearest(views, pairs);
   return {pairs.begin(), pairs.end()};
 }
 
-Result<FeatureGraph> matched(const Session& session, const std::vector<const FrameRecord*>& frames,
-                             const std::vector<PosedView>& views, PoseOptions options,
-                             const std::filesystem::path& folder, const Progress& progress) {
+Result<FeatureGraph> matched(const Session& session, const std::vector<PosedView>& views,
+                             PoseOptions options, const std::filesystem::path& folder,
+                             const Progress& progress) {
+  const std::vector<const FrameRecord*> frames = frames_of(session, views);
   options.max_features = std::min(options.max_features, check_features);
   progress.report({"poses.visible", 0, 2, {}, "features, to check the known poses"});
   ORBITFUSE_ASSIGN(FeatureLevel level,
@@ -183,36 +177,17 @@ Result<FeatureGraph> matched(const Session& session, const std::vector<const Fra
   return level.graph();
 }
 
-void take(const PhotoJudgement& judged, const std::vector<const FrameRecord*>& frames,
-          ModalityPoses& poses) {
-  for (const auto& [frame, why] : judged.wrong) {
-    const std::string& file = frames[at(frame)]->file;
-    std::erase_if(poses.reconstruction.views,
-                  [&](const PosedView& view) { return view.name == file; });
-    poses.dropped.push_back({file, why});
-  }
-  for (const auto& [frame, why] : judged.doubtful)
-    poses.doubtful.push_back({frames[at(frame)]->file, DoubtReason::neighbours_elsewhere, why});
-  poses.ladder.back().posed = static_cast<int>(poses.reconstruction.views.size());
-  poses.gates["posed_ratio"] = poses.posed_ratio();
-}
-
 }  // namespace
 
 Status check_by_photos(const Session& session, const PoseOptions& options,
                        const std::filesystem::path& workdir, const Progress& progress,
                        ModalityPoses& poses) {
-  std::vector<const FrameRecord*> frames;
-  for (const FrameRecord* frame : session.frames_of(Modality::visible))
-    if (std::any_of(poses.reconstruction.views.begin(), poses.reconstruction.views.end(),
-                    [&](const PosedView& view) { return view.name == frame->file; }))
-      frames.push_back(frame);
   const auto unchecked = [&](const std::string& why) {
     poses.skips.push_back({"check of the known poses", why,
                            "whether they are these photos' is only seen in the renders"});
   };
   const Result<FeatureGraph> graph =
-      matched(session, frames, poses.reconstruction.views, options, workdir, progress);
+      matched(session, poses.reconstruction.views, options, workdir, progress);
   ORBITFUSE_TRY(progress.check("poses.visible"));
   if (!graph) {
     const ErrorKind kind = graph.error().kind;
@@ -245,7 +220,7 @@ Status check_by_photos(const Session& session, const PoseOptions& options,
         "correct them; poses.use_known_poses = false (--set) estimates them from the photos, "
         "poses.check_known_poses = false takes them as they are");
   poses.ladder.back().why += "; " + figures;
-  take(judged, frames, poses);
+  take_known_verdicts(judged.wrong, judged.doubtful, DoubtReason::neighbours_elsewhere, poses);
   if (judged.median_px > precise_px)
     poses.warnings.push_back(
         fmt::format("the known poses miss the photos' matches by {:.1f} px (of {:.0f}) in the "

@@ -6,6 +6,7 @@
 
 #include "core/progress.hpp"
 #include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/known/session_poses.hpp"
 #include "recon/poses/known/slips.hpp"
 #include "recon/poses/sfm/feature_graph.hpp"
 
@@ -21,12 +22,12 @@ struct PhotoJudgement {
   double median_px = 0;       ///< by which true matches miss
   bool contradicted = false;  ///< the poses as a whole
   std::optional<Slip> slip;   ///< that would explain it
-  /// By frame, what speaks against its pose; the first are so wrong that they would spoil others.
-  std::vector<std::pair<int, std::string>> wrong, doubtful;
+  /// What speaks against its pose; the first are so wrong that they would spoil others.
+  NamedViews wrong, doubtful;
 };
 
-/// `given`: views of the graph's frames. Under a hundred matches nothing is judged (`checked` 0).
-/// Errors: cancelled.
+/// `given`: the views of the graph's frames, in their order. Under a hundred matches nothing is
+/// judged (`checked` 0). Errors: cancelled.
 Result<PhotoJudgement> judge_by_photos(const FeatureGraph& graph, const Reconstruction& given,
                                        const Progress& progress);
 

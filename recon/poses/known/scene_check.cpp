@@ -243,19 +243,6 @@ std::string words_of(const SceneJudgement& judged) {
   return words;
 }
 
-void take(const SceneJudgement& judged, const std::vector<PosedView>& views, ModalityPoses& poses) {
-  for (const auto& [view, why] : judged.wrong) {
-    const std::string& name = views[view].name;
-    std::erase_if(poses.reconstruction.views,
-                  [&](const PosedView& posed) { return posed.name == name; });
-    poses.dropped.push_back({name, why});
-  }
-  for (const auto& [view, why] : judged.doubtful)
-    poses.doubtful.push_back({views[view].name, DoubtReason::weak_support, why});
-  poses.ladder.back().posed = static_cast<int>(poses.reconstruction.views.size());
-  poses.gates["posed_ratio"] = poses.posed_ratio();
-}
-
 }  // namespace
 
 Result<std::optional<Contradiction>> check_by_scene(const Session& session,
@@ -263,24 +250,22 @@ Result<std::optional<Contradiction>> check_by_scene(const Session& session,
                                                     const Progress& progress,
                                                     ModalityPoses& poses) {
   const std::optional<Contradiction> believed;
-  const std::vector<PosedView> given = poses.reconstruction.views;
+  std::vector<PosedView> views = poses.reconstruction.views;
   const auto unchecked = [&](const std::string& why) {
     poses.skips.push_back({"check of the known thermal poses", why,
                            "whether they are these images' is only seen in the renders"});
     return believed;
   };
   if (!visible.renderer) return unchecked("there is no visible field to see them in");
-  if (given.size() < least_views_to_judge) return unchecked(fmt::format("{} views", given.size()));
+  if (views.size() < least_views_to_judge) return unchecked(fmt::format("{} views", views.size()));
   progress.report({"poses.thermal", 0, 1, {}, "renders, to check the known poses"});
-  std::vector<PosedView> views = given;
   OrbitViews orbit;
   orbit.canonical_from_world = canonical_from_world(visible.reconstruction.views, {});
-  for (PosedView& view : views) {
-    const auto frame =
-        std::find_if(session.frames.begin(), session.frames.end(),
-                     [&](const FrameRecord& record) { return record.file == view.name; });
+  const std::vector<const FrameRecord*> frames = frames_of(session, views);
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    PosedView& view = views[v];
     ORBITFUSE_TRY(progress.check("poses.thermal"));
-    ORBITFUSE_ASSIGN(const cv::Mat image, straight_luminance(session, *frame, view.camera));
+    ORBITFUSE_ASSIGN(const cv::Mat image, straight_luminance(session, *frames[v], view.camera));
     view.camera = narrowed_to(view.camera.without_distortion(), render_width_px);
     orbit.images.push_back(reduced_to(image, view.camera));
   }
@@ -300,7 +285,7 @@ Result<std::optional<Contradiction>> check_by_scene(const Session& session,
                     "aside in the median, of right poses half a degree",
                     *judged.median_apart_deg));
   poses.ladder.back().why += "; " + figures;
-  take(judged, given, poses);
+  take_known_verdicts(judged.wrong, judged.doubtful, DoubtReason::weak_support, poses);
   return believed;
 }
 

@@ -5,6 +5,7 @@
 
 #include "recon/poses/cross_modal/orbit_views.hpp"
 #include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/known/session_poses.hpp"
 #include "recon/poses/known/slips.hpp"
 
 // Known thermal poses held against the visible scene that they should stand in: nothing else of a
@@ -26,8 +27,8 @@ struct SceneJudgement {
   double median_correlation = 0;  ///< of an image with what the others' temperatures paint there
   bool contradicted = false;      ///< the poses as a whole
   std::optional<Slip> slip;       ///< that would explain it; its fit: the share best of all
-  /// By index, what speaks against a view: form and temperatures, or one of them.
-  std::vector<std::pair<std::size_t, std::string>> wrong, doubtful;
+  /// What speaks against a view: form and temperatures, or one of them.
+  NamedViews wrong, doubtful;
 };
 
 /// `orbit`: images (CV_32FC1 of the views' cameras' size, as lenses without distortion would have

@@ -4,6 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <set>
+#include <string_view>
 
 #include "core/numeric/median.hpp"
 #include "recon/poses/frame_camera.hpp"
@@ -102,6 +105,30 @@ Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
                          fmt::format("the session carries {} poses", posed),
                          "no structure from motion"});
   return poses;
+}
+
+std::vector<const FrameRecord*> frames_of(const Session& session,
+                                          const std::vector<PosedView>& views) {
+  std::map<std::string_view, const FrameRecord*> by_name;
+  for (const FrameRecord& frame : session.frames) by_name[frame.file] = &frame;
+  std::vector<const FrameRecord*> frames;
+  for (const PosedView& view : views) frames.push_back(by_name.at(view.name));
+  return frames;
+}
+
+void take_known_verdicts(const NamedViews& wrong, const NamedViews& doubtful, DoubtReason reason,
+                         ModalityPoses& poses) {
+  std::vector<PosedView>& views = poses.reconstruction.views;
+  for (const auto& [view, why] : doubtful)
+    poses.doubtful.push_back({views[view].name, reason, why});
+  std::set<std::string> gone;
+  for (const auto& [view, why] : wrong) {
+    poses.dropped.push_back({views[view].name, why});
+    gone.insert(views[view].name);
+  }
+  std::erase_if(views, [&](const PosedView& view) { return gone.contains(view.name); });
+  poses.ladder.back().posed = static_cast<int>(views.size());
+  poses.gates["posed_ratio"] = poses.posed_ratio();
 }
 
 Session without_known_poses(Session session, Modality modality, double true_focal) {

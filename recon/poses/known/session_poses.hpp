@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "recon/poses/estimate_poses.hpp"
 
@@ -13,6 +15,17 @@ bool has_known_poses(const Session& session, Modality modality);
 
 /// The posed frames in the session's world; those without a pose are named in `dropped`.
 Result<ModalityPoses> known_poses(const Session& session, Modality modality);
+
+/// The frames of a session's views, in the same order.
+std::vector<const FrameRecord*> frames_of(const Session& session,
+                                          const std::vector<PosedView>& views);
+
+/// Views by index, and what speaks against the pose of each.
+using NamedViews = std::vector<std::pair<std::size_t, std::string>>;
+
+/// Drops the `wrong` views of known poses and doubts others for `reason`, by name.
+void take_known_verdicts(const NamedViews& wrong, const NamedViews& doubtful, DoubtReason reason,
+                         ModalityPoses& poses);
 
 /// As if the modality's poses had not been given; of the cameras that came with them the focal
 /// length is left, times `true_focal`, as what a user says of it, since it may be wrong as well.

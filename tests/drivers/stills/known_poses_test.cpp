@@ -23,6 +23,14 @@ class KnownPoses : public ImportFiles {
     ASSERT_TRUE(write_transforms_json(folder / "transforms.json", transforms));
     options.transforms_json = folder / "transforms.json";
   }
+
+  /// The photos of "in" once more, of a place that the poses' file doesn't name.
+  Result<ImportReport> import_from_elsewhere() {
+    std::filesystem::rename(folder / "in", folder / "elsewhere");
+    std::filesystem::remove_all(folder / "session");
+    options.visible = {folder / "elsewhere"};
+    return import();
+  }
 };
 
 TEST_F(KnownPoses, AnImageWithTwoDifferentPosesHasNoneAndIsNamed) {
@@ -36,10 +44,7 @@ TEST_F(KnownPoses, AnImageWithTwoDifferentPosesHasNoneAndIsNamed) {
   EXPECT_THAT(report->warnings, test::one_says("1.jpg has two different poses"));
   EXPECT_THAT(report->warnings, test::none_says("the same image as"));
   // Found by name, where the images lie elsewhere.
-  std::filesystem::rename(folder / "in", folder / "elsewhere");
-  std::filesystem::remove_all(folder / "session");
-  options.visible = {folder / "elsewhere"};
-  const auto by_name = import();
+  const auto by_name = import_from_elsewhere();
   ASSERT_TRUE(by_name) << by_name.error().message();
   EXPECT_EQ(by_name->with_pose, 2);
   EXPECT_THAT(by_name->warnings, test::one_says("1.jpg has two different poses"));
@@ -55,10 +60,7 @@ TEST_F(KnownPoses, AnImageThatIsThereTwiceWithOnePoseIsOneFrame) {
   EXPECT_EQ(report->with_pose, 2);
   EXPECT_THAT(report->warnings, test::none_says("the same image as"));
   // Found by name too, where the images lie elsewhere.
-  std::filesystem::rename(folder / "in", folder / "elsewhere");
-  std::filesystem::remove_all(folder / "session");
-  options.visible = {folder / "elsewhere"};
-  const auto by_name = import();
+  const auto by_name = import_from_elsewhere();
   ASSERT_TRUE(by_name) << by_name.error().message();
   EXPECT_EQ(by_name->with_pose, 2);
 }
