@@ -30,9 +30,13 @@ std::map<std::string, std::string> contents(const fs::path& folder) {
 
 class BadInput : public testing::Test {
  protected:
-  void make_session(const FixtureOptions& options = {}) { write_fixture_session(session, options); }
+  void make_session(const FixtureOptions& options = {.thermal = few_thermal}) {
+    write_fixture_session(session, options);
+  }
   Outcome poses(const RunOptions& options = {}) {
-    return orbitfuse_program({"poses", session.string(), "--out", out.string()}, options);
+    return orbitfuse_program({"poses", session.string(), "--out", out.string(), "--set",
+                              "poses.check_known_poses=" + checked},
+                             options);
   }
   fs::path first_file(const std::string& modality) {
     std::vector<fs::path> files;
@@ -58,6 +62,7 @@ class BadInput : public testing::Test {
   test::TempFolder temp;
   fs::path session = temp.path() / "session", out = temp.path() / "out";
   std::map<std::string, std::string> before;
+  std::string checked = "true";  ///< "false": no field is trained to check many thermal poses
 };
 
 TEST_F(BadInput, MissingFolder) {
@@ -96,7 +101,8 @@ TEST_F(BadInput, TruncatedThermal) {
 }
 
 TEST_F(BadInput, MissingFrame) {
-  make_session();
+  make_session({});
+  checked = "false";
   run_before_the_damage();
   const fs::path file = first_file("thermal");
   fs::remove(file);

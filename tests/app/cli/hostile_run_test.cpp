@@ -20,7 +20,7 @@ using testing::HasSubstr;
 
 class HostileRun : public testing::Test {
  protected:
-  HostileRun() { write_fixture_session(session); }
+  HostileRun() { write_fixture_session(session, {.thermal = few_thermal}); }
   void make_poses() const { ASSERT_EQ(on_out("poses", session).code, 0); }
   Outcome on_out(const std::string& verb, const fs::path& of,
                  std::vector<std::string> more = {}) const {

@@ -379,7 +379,7 @@ TEST_F(Hostile, ExchangedFramesAreToldAndEditedOnesNamed) {
 }
 
 TEST_F(Hostile, ADamagedRunJsonIsToldByInspect) {
-  write_fixture_session(path("s"));
+  write_fixture_session(path("s"), {.thermal = few_thermal});
   ASSERT_EQ(orbitfuse_program({"poses", path("s"), "--out", path("o")}).code, 0);
   EXPECT_EQ(orbitfuse_program({"inspect", path("o")}).code, 0);
   std::ofstream(path("o/run.json")) << "{\"cut";
@@ -387,7 +387,7 @@ TEST_F(Hostile, ADamagedRunJsonIsToldByInspect) {
 }
 
 TEST_F(Hostile, ReportTellsWhatIsThereAndMakesNothing) {
-  write_fixture_session(path("s"));
+  write_fixture_session(path("s"), {.thermal = few_thermal});
   const auto report = [&] { return orbitfuse_program({"report", path("s"), "--out", path("o")}); };
   refused(report(), 3, "no finished stage");
   EXPECT_FALSE(fs::exists(path("o/run.json")));

@@ -209,7 +209,7 @@ TEST_F(Run, DryRunWritesNothing) {
 }
 
 TEST_F(Run, ResultsOfAnotherSessionAreKeptUnlessForcedAndThenGoWhole) {
-  write_fixture_session(session);
+  write_fixture_session(session, {.thermal = few_thermal});
   ASSERT_EQ(run({}, {}, "poses").code, 0);
   const fs::path first = session, record = out / "poses_visible" / "stage.json";
   const std::string before = *read_file(record);
@@ -243,17 +243,15 @@ TEST_F(Run, ResultsOfAnotherSessionAreKeptUnlessForcedAndThenGoWhole) {
     ASSERT_TRUE(write_file_atomic(out / file, "{}"));
   const Outcome forced = run({"--force"}, {}, "poses");
   EXPECT_EQ(forced.code, 0) << forced.err;
-  EXPECT_THAT(
-      forced.out,
-      HasSubstr("are removed first: poses_visible, depth, train_visible, poses_thermal; what else "
-                "lies there stays: measurements.json, mine"));
+  EXPECT_THAT(forced.out, HasSubstr("are removed first: poses_visible, poses_thermal; what else "
+                                    "lies there stays: measurements.json, mine"));
   EXPECT_TRUE(fs::exists(out / "mine/stage.json"));
   EXPECT_FALSE(fs::exists(out / "poses_thermal")) << "would be taken for this session's";
   EXPECT_EQ(states(run({}, {}, "poses")).at("poses_visible"), "unchanged");
 }
 
 TEST_F(Run, ASessionThatMovedOrWasCopiedGoesOn) {
-  write_fixture_session(session);
+  write_fixture_session(session, {.thermal = few_thermal});
   ASSERT_EQ(run({}, {}, "poses").code, 0);
   const fs::path first = session;
   session = temp.path() / "copy";
@@ -289,7 +287,7 @@ TEST_F(Run, ASessionThatMovedOrWasCopiedGoesOn) {
 }
 
 TEST_F(Run, FilesOfPosesAreFoundFromAFolderThatIsALink) {
-  write_fixture_session(session);
+  write_fixture_session(session, {.thermal = few_thermal});
   fs::create_directories(temp.path() / "far" / "away" / "results");
   fs::create_directory_symlink(temp.path() / "far" / "away" / "results", out);
   ASSERT_EQ(run({}, {}, "poses").code, 0);
@@ -302,7 +300,7 @@ TEST_F(Run, FilesOfPosesAreFoundFromAFolderThatIsALink) {
 }
 
 TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
-  write_fixture_session(session);
+  write_fixture_session(session, {.thermal = few_thermal});
   ASSERT_EQ(run({}, {}, "poses").code, 0);
   auto cameras = read_transforms_json(out / "poses_visible/transforms.json");
   ASSERT_TRUE(cameras);
@@ -330,7 +328,7 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
 }
 
 TEST_F(Run, JsonStreamIsOneObjectALineAndEndsWithTheResult) {
-  write_fixture_session(session);
+  write_fixture_session(session, {.thermal = few_thermal});
   const Outcome outcome = run({}, {}, "poses");
   const auto events = outcome.events();  // throws on a line that isn't JSON
   ASSERT_FALSE(events.empty());

@@ -15,6 +15,9 @@ struct FixtureOptions {
   double warmer_k = 0;  ///< than 290 to 310 K
 };
 
+/// Of known thermal poses so few are not held against renders: `poses` trains no field for them.
+inline constexpr int few_thermal = 5;
+
 /// A session of a coloured, heated box seen from an orbit, recorded by the real writer. Aborts the
 /// test when it can't be written.
 void write_fixture_session(const std::filesystem::path& folder, const FixtureOptions& options = {});
