@@ -66,7 +66,7 @@ const std::vector<Verb>& verbs() {
        "Write the surface of a finished run for other programs: GLB, PLY, OBJ, LAS",
        "orbitfuse export out/ --to van.glb",
        add_export,
-       of_results,
+       CommonUse{.config = true, .force = true, .fields = true},
        {{"--out", run_first, "write orbitfuse export OUT; the file to write is --to"}}},
       {"compare", "Say what became warmer, colder or moved between two runs of one object",
        "orbitfuse compare before/ after/ --out difference/", add_compare, of_results},

@@ -10,6 +10,7 @@
 #include <optional>
 #include <set>
 
+#include "app/eval/doubts.hpp"
 #include "app/eval/image_error.hpp"
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
@@ -88,6 +89,7 @@ struct Run {
     return fs::exists(out / stage / pipeline::stage_record_file);
   }
   void note(const std::string& text) { result["notes"].push_back(text); }
+  void warn(const std::string& text) { result["warnings"].push_back(text); }
 };
 
 Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Modality modality,
@@ -109,7 +111,9 @@ Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Mod
     run.note(stage + ": " + fit.error().message());
     return {};
   }
-  run.result[stage] = to_json(pose_error(pairs, *fit), views->second.size());
+  const PoseError error = pose_error(pairs, *fit);
+  run.result[stage] = to_json(error, views->second.size());
+  if (const auto doubt = doubt_of_truth(pairs, error)) run.warn(stage + ": " + *doubt);
   (modality == Modality::visible ? run.truth_from_visible : run.truth_from_thermal) = *fit;
   return {};
 }
@@ -118,8 +122,12 @@ Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Mod
 /// Also as training left them (poses refined against the field).
 Status add_registration(Run& run, const Session& session, const GroundTruth& truth,
                         const std::vector<PosePair>& thermal) {
-  if (!run.done("register") || !run.truth_from_visible || !run.truth_from_thermal) {
-    run.note("no registration to measure");
+  if (!run.done("register")) {
+    run.note("register is not finished: no registration to measure");
+    return {};
+  }
+  if (!run.truth_from_visible || !run.truth_from_thermal) {
+    run.note("the registration is measured where both modalities' poses are");
     return {};
   }
   ORBITFUSE_ASSIGN(const stages::RegistrationRecord record,
@@ -237,7 +245,11 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
   }
   json result = {{"views", truth.test.size()}};
   if (sums.visible > 0) {
-    result["visible_psnr_db"] = sums.visible_psnr / sums.visible;
+    const double psnr_db = sums.visible_psnr / sums.visible;
+    result["visible_psnr_db"] = psnr_db;
+    ORBITFUSE_ASSIGN(const stages::TrainedFrames trained,
+                     stages::load_trained_frames(run.out / "train_visible"));
+    if (const auto doubt = doubt_of_test_views(psnr_db, trained.heldout_psnr_db)) run.warn(*doubt);
   }
   if (sums.thermal > 0) {
     result["temperature_mae_c"] = sums.mae_k / sums.thermal;
@@ -254,7 +266,7 @@ Result<json> evaluate(const fs::path& out, const Session& session, const GroundT
                       const EvaluateOptions& options, const Progress& progress) {
   Run run;
   run.out = out;
-  run.result["notes"] = json::array();
+  run.result["notes"] = run.result["warnings"] = json::array();
   std::vector<PosePair> visible, thermal;
   ORBITFUSE_TRY(add_poses(run, session, truth, Modality::visible, visible));
   ORBITFUSE_TRY(add_poses(run, session, truth, Modality::thermal, thermal));

@@ -20,7 +20,8 @@ struct EvaluateOptions {
 /// (Umeyama 1991). Thermal poses once by their own fit, and once in the visible frame, through the
 /// registration, by the visible fit: that is the registration's error. Test views: both fields
 /// rendered from the true cameras brought into the visible frame by the visible fit, so that pose
-/// errors count. What a run did not make is absent from the result, with the reason in "notes".
+/// errors count. What a run did not make is absent from the result, with the reason in "notes"; in
+/// "warnings" is why figures may rather tell of the truth.
 Result<nlohmann::json> evaluate(const std::filesystem::path& out, const Session& session,
                                 const GroundTruth& truth, const EvaluateOptions& options,
                                 const Progress& progress);

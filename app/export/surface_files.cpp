@@ -33,6 +33,13 @@ Result<Eigen::AlignedBox3d> box_of(const SurfaceRequest& request,
   return Eigen::AlignedBox3d(center - half, center + half);
 }
 
+/// As --crop-box takes it.
+std::string words_of(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d c = box.center(), s = box.sizes();
+  return fmt::format("{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}", c.x(), c.y(), c.z(), s.x(), s.y(),
+                     s.z());
+}
+
 /// Palette colours for temperatures, gray where there is none.
 Status paint_temperatures(const view::FinishedRun& run, const std::string& name,
                           PointCloud& vertices) {
@@ -102,7 +109,13 @@ Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceR
   ORBITFUSE_ASSIGN(const Eigen::AlignedBox3d box, box_of(request, cameras));
   FieldSurfaceOptions options = request.surface;
   options.min_opacity = run.config.render.min_opacity;
-  return field_surface(fields, box, options, progress);
+  auto surface = field_surface(fields, box, options, progress);
+  if (surface || request.crop != Crop::box || surface.error().kind != ErrorKind::quality)
+    return surface;
+  const auto object = object_box(cameras);
+  return fail(ErrorKind::usage, "--crop-box", "no surface in it: " + surface.error().found,
+              object ? "the cameras look at " + words_of(*object)
+                     : "give a box round what the cameras look at");
 }
 
 std::string surface_key(const view::FinishedRun& run, const SurfaceRequest& request) {
@@ -127,6 +140,17 @@ Status check_extension(const fs::path& file) {
     if (extension == known) return {};
   return fail(ErrorKind::usage, "--to", "'" + file.string() + "'",
               "choose a name that ends in .glb, .ply, .obj or .las");
+}
+
+bool holds_other_work(const fs::path& file) {
+  const fs::path beside = file.string() + ".json";
+  std::error_code ignored;
+  const bool there = fs::exists(file, ignored);
+  if (!fs::exists(beside, ignored)) return there;
+  const auto about = stages::read_json(beside);
+  if (!about || !about->is_object() || !about->contains("world_from_export")) return true;
+  const json hash = about->value("file_hash", json());  // older exports have none
+  return there && !hash.is_null() && hash != file_hash(file).value_or("");
 }
 
 Status write_surface(const fs::path& file, const view::FinishedRun& run,

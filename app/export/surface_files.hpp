@@ -24,7 +24,7 @@ struct SurfaceRequest {
   FieldSurfaceOptions surface;
 };
 
-/// Errors: field_surface's, object_box's.
+/// Errors: field_surface's, object_box's; usage (Crop::box holds no surface; says where it is).
 Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceRequest& request,
                                     const Progress& progress);
 
@@ -51,6 +51,10 @@ inline constexpr const char* default_surface_file = "export/surface.glb";
 Status write_surface(const std::filesystem::path& file, const view::FinishedRun& run,
                      const FieldSurface& surface, const ExportFrame& frame,
                      const FileOptions& options);
+
+/// Whether something lies at the file's place, or its sidecar's, that write_surface() did not leave
+/// there as it is now: a user's own, or an export that was worked on since.
+bool holds_other_work(const std::filesystem::path& file);
 
 /// In lower case: A.GLB is a .glb.
 std::string extension_of(const std::filesystem::path& file);

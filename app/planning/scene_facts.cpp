@@ -5,7 +5,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "core/formats/transforms_json.hpp"
+#include "app/stages/given_cameras.hpp"
 #include "core/image/image_io.hpp"
 
 namespace orbitfuse::planning {
@@ -52,11 +52,11 @@ Status look_at_new_views(const stages::RenderConfig& config, double height_by_wi
   facts.new_views = config.path.views;
   facts.new_view_mpx = 1e-6 * config.path.width_px * config.path.width_px * height_by_width;
   if (config.cameras.empty()) return {};
-  ORBITFUSE_ASSIGN(const Transforms given, read_transforms_json(config.cameras));
+  ORBITFUSE_ASSIGN(const stages::GivenCameras given, stages::read_given_cameras(config.cameras));
   double pixels = 0;
-  for (const TransformsFrame& frame : given.frames)
-    pixels += static_cast<double>(frame.camera.width) * frame.camera.height;
-  facts.new_views = static_cast<int>(given.frames.size());
+  for (const PosedView& view : given.views.views)
+    pixels += static_cast<double>(view.camera.width) * view.camera.height;
+  facts.new_views = static_cast<int>(given.files.size());
   facts.new_view_mpx = 1e-6 * pixels / std::max(1, facts.new_views);
   return {};
 }

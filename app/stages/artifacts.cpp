@@ -166,6 +166,7 @@ Result<TrainedFrames> load_trained_frames(const fs::path& folder) {
   const JsonFields metrics = metric_fields(record, folder);
   TrainedFrames frames;
   ORBITFUSE_TRY(metrics.get_all("heldout", frames.heldout, "width_px", frames.width_px));
+  ORBITFUSE_TRY(metrics.get_present("heldout_psnr_db", frames.heldout_psnr_db));
   if (metrics.has("shading_k"))
     ORBITFUSE_TRY(metrics.get("shading_k", frames.shading_k));  // 2026-11
   ORBITFUSE_ASSIGN(const JsonFields gains, metrics.child("image_gains"));

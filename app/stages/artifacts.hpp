@@ -3,6 +3,7 @@
 
 #include <array>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -69,6 +70,7 @@ struct TrainedFrames {
   std::map<std::string, double> offsets_k;  ///< the camera's drift in a frame; of the others none
   double shading_k = 0;              ///< nerf::shading_image(): in every frame, not in the field
   std::vector<std::string> heldout;  ///< that the field did not learn from
+  double heldout_psnr_db = std::numeric_limits<double>::quiet_NaN();  ///< NaN: there were none
   int width_px = 0;
 };
 /// `folder`: of the finished training. Errors: input (its record is cut or of another version).

@@ -9,9 +9,11 @@
 #include <optional>
 
 #include "app/stages/artifacts.hpp"
+#include "app/stages/given_cameras.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
+#include "app/stages/unseen_views.hpp"
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
@@ -20,6 +22,7 @@
 #include "core/system/side_by_side.hpp"
 #include "core/system/trace.hpp"
 #include "fusion/heat/heat.hpp"
+#include "recon/assembly/field_renderer.hpp"
 #include "recon/assembly/looked_at.hpp"
 #include "recon/nerf/nerf.hpp"
 
@@ -99,34 +102,26 @@ std::string words_on_detail(const Fields& fields) {
   return {};
 }
 
-Result<NewViews> choose_views(const StageContext& context, const RenderConfig& config,
-                              Modality frame) {
+Result<GivenCameras> choose_views(const StageContext& context, const RenderConfig& config,
+                                  Modality frame) {
   if (config.cameras.empty()) {
     ORBITFUSE_ASSIGN(const Reconstruction posed,
                      load_poses(context.of("poses_" + std::string(name(frame))), frame));
-    return new_views(posed.views, config.path);
+    ORBITFUSE_ASSIGN(NewViews views, new_views(posed.views, config.path));
+    return GivenCameras{std::move(views), {}};
   }
-  ORBITFUSE_ASSIGN(const Transforms given, read_transforms_json(config.cameras));
-  NewViews views;
-  constexpr double max_pixels = 64e6;  // a view is held whole, with depth and opacity
-  for (std::size_t i = 0; i < given.frames.size(); ++i) {
-    const Camera& camera = given.frames[i].camera;
-    if (static_cast<double>(camera.width) * camera.height > max_pixels)
-      return fail(ErrorKind::input, fmt::format("{}: frames[{}]", config.cameras, i),
-                  fmt::format("{}x{} pixels", camera.width, camera.height),
-                  "choose w and h for at most 64 megapixels");
-  }
-  for (const TransformsFrame& f : given.frames)
-    views.views.push_back({fmt::format("{:03}", views.views.size()), f.camera.without_distortion(),
-                           f.cam_from_world});
-  if (views.views.empty())
-    return fail(ErrorKind::input, config.cameras, "no frames", "list at least one camera");
-  const bool bent = std::any_of(
-      given.frames.begin(), given.frames.end(),
-      [](const TransformsFrame& f) { return !(f.camera == f.camera.without_distortion()); });
-  views.described = fmt::format("{} given cameras{}", views.views.size(),
-                                bent ? ", without their lens distortion" : "");
-  return views;
+  return read_given_cameras(config.cameras);
+}
+
+/// What the views that the field of `frame` learned from saw of it.
+Result<UnseenViews> recorded_views_of(const StageContext& context, const Fields& fields,
+                                      Modality frame) {
+  const TraceSpan span("what recorded views saw");
+  const DetailedField& shown = frame == Modality::visible ? fields.visible : fields.thermal;
+  ORBITFUSE_ASSIGN(const Reconstruction posed, load_trained_poses(context, frame));
+  ORBITFUSE_ASSIGN(SeenBefore seen,
+                   SeenBefore::of(depth_renderer(shown.field, context.progress), posed.views));
+  return UnseenViews(std::move(seen));
 }
 
 /// Where a ray met nothing the field knows, there is no temperature.
@@ -181,9 +176,11 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
   const RenderConfig& config = in.config->render;
   ORBITFUSE_ASSIGN(Fields fields, load_fields(context));
   const Modality frame = fields.visible.empty() ? Modality::thermal : Modality::visible;
-  ORBITFUSE_ASSIGN(const NewViews chosen, choose_views(context, config, frame));
+  ORBITFUSE_ASSIGN(const GivenCameras given, choose_views(context, config, frame));
+  const NewViews& chosen = given.views;
   StageOutput output;
   ORBITFUSE_TRY(load_detail(context, in, chosen, fields, output));
+  ORBITFUSE_ASSIGN(UnseenViews unseen, recorded_views_of(context, fields, frame));
   const bool gray = !in.session->has_temperatures();
   const Similarity3d thermal_from_visible = fields.visible_from_thermal.inverse();
 
@@ -212,6 +209,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
       f.depth = "depth/" + view.name + ".tiff";
       f.visible_opacity = "opacity/" + view.name + "_visible.tiff";
       depth = seen.depth;
+      unseen.look_at(view, depth);
       writes.emplace_back([=] { return write_png(to / f.visible, bgr8_of_rgb(seen.color)); });
       writes.emplace_back([=] { return write_float_tiff(to / f.depth, depth); });
       writes.emplace_back([=] { return write_float_tiff(to / f.visible_opacity, seen.opacity); });
@@ -235,6 +233,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
       writes.emplace_back([=] { return write_float_tiff(to / f.thermal_opacity, seen.opacity); });
       if (f.depth.empty()) {
         f.depth = "depth/" + view.name + ".tiff";
+        unseen.look_at(view, seen.depth);
         writes.emplace_back([=] { return write_float_tiff(to / f.depth, seen.depth); });
       }
     }
@@ -242,6 +241,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
     TransformsFrame entry{
         f.visible.empty() ? f.thermal : f.visible, {}, view.camera, view.cam_from_world};
     if (!f.thermal.empty()) entry.thermal_file_path = f.thermal;
+    if (!given.files.empty()) entry.source = given.files[files.size()];
     transforms.frames.push_back(std::move(entry));
     files.push_back(std::move(f));
   }
@@ -257,6 +257,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
     if (!shown->detail.empty())
       output.metrics[detail_key(shown->field.modality())]["share"] =
           shown->detailed / static_cast<double>(files.size());
+  unseen.tell(config.cameras.empty() ? "" : "poses_" + std::string(name(frame)), output);
   RenderedViews rendered;
   rendered.thermal_is_gray = gray;
   if (!temperatures.empty()) {
@@ -274,7 +275,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 6;  // detail is tried on the middle half of recorded views
+  stage.version = 7;  // says which views show what nobody saw; given ones keep their names
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   const std::string& cameras = in.config->render.cameras;

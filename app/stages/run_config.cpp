@@ -176,6 +176,15 @@ void add_fuse(Settings& settings, FuseConfig& fuse) {
       "Gray levels within which a patch is flat and the network is not asked; -1: always asked");
 }
 
+/// "pca_msif.smoother.cycles" as add_fuse() calls it.
+Error as_fuse_key(Error error) {
+  std::string key = error.where;
+  if (const auto at = key.find(".smoother"); at != std::string::npos) key.erase(at, 9);
+  std::replace(key.begin(), key.end(), '.', '_');
+  error.where = "fuse." + key;
+  return error;
+}
+
 }  // namespace
 
 Result<std::vector<FusionMethod>> FuseConfig::chosen() const {
@@ -237,7 +246,7 @@ Status RunConfig::validate() const {
   }));
   ORBITFUSE_TRY(palette(render.palette));
   ORBITFUSE_TRY(fuse.chosen());
-  ORBITFUSE_TRY(fuse.options.validate());
+  ORBITFUSE_TRY(fuse.options.validate().map_error(as_fuse_key));
   ORBITFUSE_TRY(OptionCheck("metrics")("scored_views", metrics.scored_views, at_least(0)));
   return OptionCheck("render")("min_opacity", render.min_opacity, from_to(0, 1));
 }

@@ -46,6 +46,7 @@ void print(terminal::Console& console, const json& result) {
                                it->at("thermal_psnr_db").get<double>(),
                                100 * it->at("thermal_covered").get<double>()));
   }
+  for (const json& warning : result["warnings"]) console.warning(warning.get<std::string>());
   for (const json& note : result["notes"]) console.info("note: " + note.get<std::string>());
 }
 

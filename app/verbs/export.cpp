@@ -198,24 +198,28 @@ Status check_outside_stages(const fs::path& out, const char* option, const fs::p
 }
 
 /// What would be found only after the surface was made.
-Status check_target(const fs::path& out, const fs::path& file) {
+Status check_target(const fs::path& out, const fs::path& file, bool force) {
   ORBITFUSE_TRY(check_extension(file));
   std::error_code unreadable;
   if (fs::is_directory(file, unreadable))
     return fail(ErrorKind::usage, "--to", "'" + file.string() + "', which is a folder",
                 "name a file");
   ORBITFUSE_TRY(check_outside_stages(out, "--to", file));
-  return pipeline::check_out_file(file);
+  ORBITFUSE_TRY(pipeline::check_out_file(file));
+  if (force || !holds_other_work(file)) return {};
+  return fail(ErrorKind::usage, "--to",
+              "'" + file.string() + "', where something is that no export left there",
+              "name another file, or write over it and its .json: --force");
 }
 
 /// Likewise of all targets together.
-Status check_targets(const ExportArguments& o, const std::vector<fs::path>& files) {
+Status check_targets(const ExportArguments& o, const std::vector<fs::path>& files, bool force) {
   std::error_code unreadable;
   std::set<fs::path> seen;
   const fs::path dataset =
       fs::weakly_canonical(fs::absolute(o.dataset, unreadable), unreadable) / "";
   for (const fs::path& file : files) {
-    ORBITFUSE_TRY(check_target(o.out, file));
+    ORBITFUSE_TRY(check_target(o.out, file, force));
     const fs::path whole = fs::weakly_canonical(fs::absolute(file, unreadable), unreadable);
     if (!seen.insert(whole).second)
       return fail(ErrorKind::usage, "--to", "'" + file.string() + "' twice", "name each file once");
@@ -269,7 +273,7 @@ Status run(Context& context, const ExportArguments& o) {
   ORBITFUSE_TRY(check_pairs(o));
   std::vector<fs::path> files(o.files.begin(), o.files.end());
   if (files.empty() && o.dataset.empty()) files.push_back(fs::path(o.out) / default_surface_file);
-  ORBITFUSE_TRY(check_targets(o, files));
+  ORBITFUSE_TRY(check_targets(o, files, context.common.force));
   ORBITFUSE_ASSIGN(const SurfaceRequest request, request_of(o));
   Eigen::Vector3d up = Eigen::Vector3d::Zero();
   if (!o.up.empty()) {

@@ -186,7 +186,8 @@ Status run(Context& context, ImportArguments& o) {
                   : report.has_temperatures ? " with temperatures"
                                             : " without temperatures",
                   report.tracking, report.with_pose, report.with_station));
-  if (dry) context.console.info("nothing was written");
+  context.console.info(dry ? "nothing was written"
+                           : fmt::format("next: orbitfuse run {} --out out", o.session));
   context.result = {{"session", o.session},
                     {"visible", report.visible},
                     {"thermal", report.thermal},

@@ -181,6 +181,8 @@ Status inspect_run(Context& context, const fs::path& folder) {
     context.console.data(fmt::format("{:<14} {}  {:>7.1f} s  {}", record->stage,
                                      record->finished_utc, record->wall_s,
                                      record->output.metrics.value("brief", std::string())));
+    for (const std::string& warning : record->output.warnings)
+      context.console.warning(record->stage + ": " + warning);
     stages.push_back(to_json(*record));
   }
   tell_without_record(context, folder, finished);

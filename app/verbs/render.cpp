@@ -3,7 +3,7 @@
 #include "app/cli/run_stages.hpp"
 #include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
-#include "core/formats/transforms_json.hpp"
+#include "app/stages/given_cameras.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -33,7 +33,7 @@ Action add_render(CLI::App& app) {
                                {"--width", options->width.has_value(), "--cameras", cameras}}));
     if (cameras) {
       // Read here once, so that a wrong file doesn't cost the training that comes before it.
-      ORBITFUSE_TRY(read_transforms_json(options->cameras));
+      ORBITFUSE_TRY(stages::read_given_cameras(options->cameras));
       context.config.render.cameras = options->cameras;
     }
     config::Settings settings = context.config.settings();

@@ -7,7 +7,7 @@
 #include "app/cli/training_limits.hpp"
 #include "app/cli/verb.hpp"
 #include "app/stages/build_stages.hpp"
-#include "core/formats/transforms_json.hpp"
+#include "app/stages/given_cameras.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -53,7 +53,7 @@ Action add_run(CLI::App& app) {
     ORBITFUSE_TRY(apply(*limits, {Modality::visible, Modality::thermal}, context.config));
     if (!cameras->empty()) {
       // Read here once, so that a wrong file doesn't cost the hours before it is needed.
-      ORBITFUSE_TRY(read_transforms_json(*cameras));
+      ORBITFUSE_TRY(stages::read_given_cameras(*cameras));
       context.config.render.cameras = *cameras;
     }
     return run_planned(context, *folders, *stages_wanted, budget_s);

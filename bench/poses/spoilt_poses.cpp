@@ -76,6 +76,14 @@ void move_all(Views& views, double turn_deg, double scale) {
   }
 }
 
+/// Two reconstructions in one file: the views from `first` on live in a world of their own.
+void move_from(Views& views, std::size_t first, double turn_deg, double scale) {
+  Views moved = views;
+  move_all(moved, turn_deg, scale);
+  std::copy(moved.begin() + static_cast<std::ptrdiff_t>(first), moved.end(),
+            views.begin() + static_cast<std::ptrdiff_t>(first));
+}
+
 /// The axes of OpenGL's cameras for those of OpenCV's.
 void flip_axes(Views& views) {
   for (PosedView& view : views) turn(view, Eigen::Vector3d::UnitX(), 180);
@@ -122,6 +130,11 @@ std::vector<SpoiltPoses> spoilt_poses(int count, Modality modality) {
     for (PosedView& view : v) view.cam_from_world = view.cam_from_world.inverse();
   });
   all("y and z turned", flip_axes);
+  if (!thermal) {
+    all("one half turned by 20 deg", [=](Views& v) { move_from(v, of(count / 2), 20, 1); });
+    all("one half 1.2 times as large", [=](Views& v) { move_from(v, of(count / 2), 0, 1.2); });
+    all("a quarter turned by 5 deg", [=](Views& v) { move_from(v, of(count - count / 4), 5, 1); });
+  }
   if (thermal) {
     all("world turned by 90 deg", [](Views& v) { move_all(v, 90, 1); });
     all("world turned by 5 deg", [](Views& v) { move_all(v, 5, 1); });

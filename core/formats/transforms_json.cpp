@@ -86,9 +86,13 @@ Result<std::optional<double>> focal_length(const Numbers& numbers, const char* k
 Result<Camera> read_camera(const Json& frame, const Json& shared, const std::string& where) {
   ORBITFUSE_ASSIGN(const Numbers numbers, read_numbers(frame, shared, where));
   const auto width = number(numbers, "w"), height = number(numbers, "h");
-  if (!width || !height || !(*width >= 1) || !(*height >= 1) || *width > 1e6 || *height > 1e6) {
+  if (!width || !height)
     return fail(ErrorKind::input, where, "no image size (w, h)", "add \"w\" and \"h\" to the file");
-  }
+  for (const double size : {*width, *height})
+    if (!(size >= 1 && size <= 1e6))
+      return fail(ErrorKind::input, where,
+                  fmt::format("an image of {} x {} pixels", *width, *height),
+                  "write its width as \"w\" and its height as \"h\", from 1 to a million");
   Camera camera;
   camera.width = static_cast<int>(*width);
   camera.height = static_cast<int>(*height);

@@ -11,4 +11,7 @@ namespace orbitfuse {
 /// than pictures need. Both arguments must outlive it.
 SceneRenderer edge_renderer(const nerf::Field& field, const Progress& progress);
 
+/// Depth of a field of either modality, likewise; brightness stays empty.
+SceneRenderer depth_renderer(const nerf::Field& field, const Progress& progress);
+
 }  // namespace orbitfuse

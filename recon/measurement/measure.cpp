@@ -105,7 +105,7 @@ void say_apart(const TemperatureReading& reading, std::vector<std::string>& note
                                 far * reading.uncertainty_k;
   const bool field_apart =
       std::abs(reading.field_k - reading.temperature_k) > reading.uncertainty_k;  // NaN: false
-  if (!frames_apart && !field_apart) return;
+  if (!frames_apart && !field_apart && (!unsure || two_camps)) return;
   std::string text;
   if (frames_apart)
     text = fmt::format("its frames are far apart ({:.1f} to {:.1f} C)", celsius_from_kelvin(low),
@@ -114,6 +114,12 @@ void say_apart(const TemperatureReading& reading, std::vector<std::string>& note
     text += fmt::format("{}the field has {:.1f} C, farther off than +- {:.1f}",
                         text.empty() ? "" : ", ", celsius_from_kelvin(reading.field_k),
                         reading.uncertainty_k);
+  if (text.empty())
+    text = fmt::format("+- {:.1f}, because {}", reading.uncertainty_k,
+                       reading.spread_k > 0.5 * reading.uncertainty_k
+                           ? fmt::format("its frames differ by {:.1f} K", reading.spread_k)
+                           : "what lies beside it is much warmer or colder, and a pose a pixel off "
+                             "shows that");
   if (most > decides && reading.frames.size() > 1)
     text += fmt::format(", and one frame decides ({} of the weight)", percent(most));
   notes.push_back(text + ": the place is small, at an edge or seen from the side");

@@ -24,7 +24,8 @@ Result<std::vector<SurfacePoint>> object_samples(const ThermalScene& scene,
 double object_radius(const ThermalScene::Middle& middle);
 
 /// Within a polygon in a view, at most 64 rays along its longer side, weighted by area. Pixels
-/// where the field has no surface are left out. Input error: the polygon lies outside the picture.
+/// where the field has no surface are left out. Input error: the polygon lies outside the picture,
+/// or its sides cross.
 Result<std::vector<SurfacePoint>> polygon_samples(const ThermalScene& scene, const PosedView& view,
                                                   const std::vector<Eigen::Vector2d>& corners,
                                                   const Progress& progress);

@@ -205,10 +205,6 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
                             lead, placed.why),
                 "record more thermal stations, or give known poses: the object looks alike from "
                 "both sides");
-  if (evidence.work.lens.guessed)
-    placed.warnings.push_back(
-        "the thermal lens is unknown: 33 degrees were assumed to begin with; give its focal length "
-        "(import --thermal-focal-px)");
   progress.report({"poses.thermal", 3, 4, {}, "alignment with renders"});
   LensGuess lens = evidence.work.lens;
   ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered,
@@ -217,6 +213,12 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
   lens.camera.fx = rendered.views.front().view.camera.fx;
   lens.camera.fy = rendered.views.front().view.camera.fy;
   lens.camera.k1 += rendered.radial;
+  if (lens.guessed)
+    placed.warnings.push_back(
+        fmt::format("the thermal lens is unknown: 33 degrees were assumed to begin with, and "
+                    "{:.1f} found ({:.0f} "
+                    "px); give its focal length (import --thermal-focal-px) if you know it better",
+                    lens.camera.horizontal_fov_deg(), lens.camera.fx));
   if (!tracking.empty())
     ORBITFUSE_TRY(pose_tracking(session, evidence.work, lens.camera, tracking, renderer, orbit,
                                 rendered, progress));

@@ -115,11 +115,14 @@ Result<PhotoJudgement> judge_by_photos(const FeatureGraph& graph, const Reconstr
       judged.slip.reset();
   }
   const bool not_theirs = held_within(misses, coarse_px).share() < least_share;
-  name_wrong(misses, frames, not_theirs ? 1 : std::max(1.0, judged.median_px / precise_px), judged);
+  const double all_off = std::max(1.0, judged.median_px / precise_px);
+  name_wrong(misses, frames, not_theirs ? 1 : all_off, judged);
   const auto wrong = static_cast<int>(judged.wrong.size());
   // Of three views one wrong one spoils two pairs of three.
   const bool most_wrong = 2 * wrong > judged.checked || (not_theirs && 3 * wrong > judged.checked);
-  judged.contradicted = judged.slip || (most_wrong && 2 * judged.checked >= frames);
+  if (!judged.slip) judged.blocks = separate_blocks(misses, frames, all_off);
+  judged.contradicted =
+      judged.slip || judged.blocks || (most_wrong && 2 * judged.checked >= frames);
   return judged;
 }
 
@@ -177,6 +180,22 @@ Result<FeatureGraph> matched(const Session& session, const std::vector<PosedView
   return level.graph();
 }
 
+/// What would explain a contradiction; empty where nothing does.
+std::string explanation(const PhotoJudgement& judged, const Reconstruction& given) {
+  if (judged.slip)
+    return fmt::format("; it looks as if {}: {} would then lie within {:.0f} px",
+                       judged.slip->words, percent(judged.slip->fit), fine_px);
+  if (!judged.blocks) return {};
+  std::string text =
+      "; it looks as if these sets of views, each right by itself, were of different "
+      "worlds:";
+  for (const std::vector<int>& block : judged.blocks->frames)
+    text += fmt::format(" {} from {} to {},", block.size(), given.views[at(block.front())].name,
+                        given.views[at(block.back())].name);
+  return text + fmt::format(" of {} matches between them {} lie there", judged.blocks->across.all,
+                            percent(judged.blocks->across.share()));
+}
+
 }  // namespace
 
 Status check_by_photos(const Session& session, const PoseOptions& options,
@@ -214,9 +233,7 @@ Status check_by_photos(const Session& session, const PoseOptions& options,
   if (judged.contradicted)
     return fail(
         ErrorKind::quality, "known visible poses",
-        judged.slip ? fmt::format("{}; it looks as if {}: {} would then lie within {:.0f} px",
-                                  figures, judged.slip->words, percent(judged.slip->fit), fine_px)
-                    : figures,
+        figures + explanation(judged, poses.reconstruction),
         "correct them; poses.use_known_poses = false (--set) estimates them from the photos, "
         "poses.check_known_poses = false takes them as they are");
   poses.ladder.back().why += "; " + figures;

@@ -6,6 +6,7 @@
 
 #include "core/progress.hpp"
 #include "recon/poses/estimate_poses.hpp"
+#include "recon/poses/known/blocks.hpp"
 #include "recon/poses/known/session_poses.hpp"
 #include "recon/poses/known/slips.hpp"
 #include "recon/poses/sfm/feature_graph.hpp"
@@ -17,11 +18,12 @@ namespace orbitfuse {
 /// What matches between photos say of given poses. Distances are of missed_side_px.
 struct PhotoJudgement {
   std::size_t matches = 0;
-  int checked = 0;            ///< views with enough matches to be judged
-  double share = 1;           ///< of the matches, held within close_px
-  double median_px = 0;       ///< by which true matches miss
-  bool contradicted = false;  ///< the poses as a whole
-  std::optional<Slip> slip;   ///< that would explain it
+  int checked = 0;               ///< views with enough matches to be judged
+  double share = 1;              ///< of the matches, held within close_px
+  double median_px = 0;          ///< by which true matches miss
+  bool contradicted = false;     ///< the poses as a whole
+  std::optional<Slip> slip;      ///< that would explain it
+  std::optional<Blocks> blocks;  ///< likewise
   /// What speaks against its pose; the first are so wrong that they would spoil others.
   NamedViews wrong, doubtful;
 };

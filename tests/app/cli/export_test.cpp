@@ -91,6 +91,19 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
     return orbitfuse_program({"export", out.string(), "--to", to.string(), "--dry-run"});
   };
   EXPECT_EQ(surface(temp / "A.GLB").code, 0);
+  test::put(temp / "mine.ply", "a user's own");
+  const Outcome kept = surface(temp / "mine.ply");
+  EXPECT_EQ(kept.code, 2);
+  EXPECT_THAT(kept.err, HasSubstr("no export left there"));
+  EXPECT_EQ(orbitfuse_program({"export", out.string(), "--to", (temp / "mine.ply").string(),
+                               "--force", "--dry-run"})
+                .code,
+            0);
+  const Outcome empty =
+      orbitfuse_program({"export", out.string(), "--to", (temp / "none.ply").string(), "--crop-box",
+                         "90,90,90,1,1,1"});
+  EXPECT_EQ(empty.code, 2);
+  EXPECT_THAT(empty.err, HasSubstr("the cameras look at "));
   const Outcome inside = surface(out / "train_thermal/cloud.ply");
   EXPECT_EQ(inside.code, 2);
   EXPECT_THAT(inside.err, HasSubstr("inside of a stage"));

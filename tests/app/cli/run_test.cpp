@@ -309,17 +309,28 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   ASSERT_TRUE(write_transforms_json(temp.path() / "cameras.json", *cameras));
   const Outcome outcome = run({"--cameras", (temp.path() / "cameras.json").string()}, {}, "render");
   ASSERT_EQ(outcome.code, 0) << outcome.err;
-  const auto image = read_visible(out / "render/visible/000.png");
+  const fs::path shown =
+      out / "render/visible" /
+      fs::path(cameras->frames[0].file_path).filename().replace_extension(".png");
+  const auto image = read_visible(shown);
   ASSERT_TRUE(image);
   EXPECT_EQ(image->cols, 40);
-  EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
   // Whatever comes after keeps them, a failed call too, until other views are asked for.
   EXPECT_EQ(run({"--cameras", "/none.json"}, {}, "render").code, 3);
   ASSERT_EQ(run({}, {}, "fuse").code, 0);
-  EXPECT_EQ(read_visible(out / "render/visible/000.png")->cols, 40);
-  EXPECT_FALSE(fs::exists(out / "render/visible/001.png"));
+  EXPECT_EQ(read_visible(shown)->cols, 40);
   ASSERT_EQ(run({"--views", "2"}, {}, "render").code, 0);
   EXPECT_TRUE(fs::exists(out / "render/visible/001.png"));
+  EXPECT_FALSE(fs::exists(shown));
+  const Rigid3d turned{Eigen::Quaterniond(Eigen::AngleAxisd(3, Eigen::Vector3d::UnitY())),
+                       {0, 0, 0}};
+  cameras->frames[0].cam_from_world = turned * cameras->frames[0].cam_from_world;
+  ASSERT_TRUE(write_transforms_json(temp.path() / "away.json", *cameras));
+  const Outcome away = run({"--cameras", (temp.path() / "away.json").string()}, {}, "render");
+  EXPECT_EQ(away.code, 0) << away.err;
+  EXPECT_THAT(away.err, HasSubstr("new views"));
+  EXPECT_THAT(away.err, HasSubstr("the world of OUT/poses_visible/transforms.json"));
+  EXPECT_THAT(orbitfuse_program({"inspect", out.string()}).err, HasSubstr("render: new views"));
   cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(1000000, 1000000);
   ASSERT_TRUE(write_transforms_json(temp.path() / "huge.json", *cameras));
   const Outcome huge = run({"--cameras", (temp.path() / "huge.json").string()}, {}, "render");

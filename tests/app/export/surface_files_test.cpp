@@ -13,6 +13,7 @@
 #include "core/formats/ply.hpp"
 #include "core/geometry/geometry_json.hpp"
 #include "core/system/file_io.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::exporting {
 namespace {
@@ -167,6 +168,26 @@ TEST(SurfaceFiles, ASidecarTellsTheFilesOwnAxes) {
     const Eigen::Vector4d world = *world_from_export * *export_from_file * in_file.homogeneous();
     EXPECT_NEAR((world.head<3>() - e.surface.mesh.vertices.positions[1]).norm(), 0, 1e-9) << name;
   }
+}
+
+TEST(SurfaceFiles, OnlyAnExportThatNobodyTouchedIsWrittenOver) {
+  const fs::path file = scratch() / "a.ply", beside = file.string() + ".json";
+  EXPECT_FALSE(holds_other_work(file));
+  const Exported e = exported();
+  ASSERT_TRUE(write_surface(file, e.run, e.surface, {}, {}));
+  EXPECT_FALSE(holds_other_work(file));
+  const std::string about = *read_file(beside);
+  test::put(file, *read_file(file) + " ");
+  EXPECT_TRUE(holds_other_work(file)) << "it was worked on";
+  fs::remove(file);
+  EXPECT_FALSE(holds_other_work(file));
+  for (const char* other : {"{}", "[1]", "a note", R"({"world_from_export": 1, "file_hash": 5})"}) {
+    test::put(beside, other);
+    test::put(file, "a user's");
+    EXPECT_TRUE(holds_other_work(file)) << other;
+  }
+  fs::remove(beside);
+  EXPECT_TRUE(holds_other_work(file));
 }
 
 TEST(SurfaceFiles, WithoutScaleThatIsSaid) {

@@ -81,6 +81,20 @@ TEST_F(HostileImport, AThermalFileAmongPhotosIsNoSecondCamera) {
   EXPECT_THAT(report->warnings, test::none_says("cameras, lenses"));
 }
 
+TEST_F(HostileImport, AFocalLengthInMillimetresIsRefused) {
+  put_photo("in/0.jpg", 1);
+  options.visible = {folder / "in"};
+  options.visible_focal_px = 4;
+  const auto refused = import();
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().kind, ErrorKind::usage);
+  EXPECT_THAT(refused.error().message(),
+              ::testing::AllOf(::testing::HasSubstr("a focal length of 4 px, with which"),
+                               ::testing::HasSubstr("millimetres times the image's width")));
+  options.visible_focal_px = 40;
+  EXPECT_TRUE(import());
+}
+
 TEST_F(HostileImport, AnAnimatedPngIsNoPhoto) {
   put_photo("in/0.jpg", 1);
   put("in/1.png", animated(half_transparent(255, 2), 3));

@@ -101,6 +101,10 @@ TEST(MeasurementStress, DegenerateRegionsHaveAnAnswer) {
   polygon.kind = Kind::polygon;
   for (int i = 0; i < 3; ++i) polygon.places.emplace_back(PixelPlace{"view0", {100, 100}});
   EXPECT_THAT(measure(scene, polygon, {}).error().message(), HasSubstr("no area"));
+  polygon.places.clear();
+  for (const auto& [x, y] : {std::pair(40., 40.), {60., 60.}, {60., 40.}, {40., 60.}})
+    polygon.places.emplace_back(PixelPlace{"view0", {x, y}});
+  EXPECT_THAT(measure(scene, polygon, {}).error().message(), HasSubstr("sides cross"));
   Request box;
   box.kind = Kind::box;
   box.box.size = {1e-12, 1e-12, 1e-12};

@@ -117,6 +117,30 @@ TEST(PhotoCheck, PosesInAnOrderOfTheirOwnAreContradictedThoughNoUsualMistakeExpl
   }
 }
 
+TEST(PhotoCheck, TwoReconstructionsInOneFileAreToldApart) {
+  const FeatureScene scene = testing_orbit::described_scene();
+  for (const auto& [turn_deg, scale] : {std::pair(20.0, 1.0), {0.0, 1.3}}) {
+    const Similarity3d aside{
+        scale,
+        Eigen::Quaterniond(Eigen::AngleAxisd(turn_deg * EIGEN_PI / 180, Eigen::Vector3d::UnitZ())),
+        Eigen::Vector3d::Zero()};
+    Reconstruction two = given(scene);
+    std::vector<int> first(12), second(12);
+    std::iota(first.begin(), first.end(), 0);
+    std::iota(second.begin(), second.end(), 12);
+    for (const int v : second)
+      two.views[at(v)].cam_from_world = rebase(two.views[at(v)].cam_from_world, aside);
+    const PhotoJudgement judged = judge(scene, two);
+    EXPECT_TRUE(judged.contradicted) << turn_deg;
+    ASSERT_TRUE(judged.blocks) << turn_deg;
+    EXPECT_EQ(judged.blocks->frames, (std::vector<std::vector<int>>{first, second}));
+  }
+  // A single view aside is no block.
+  Reconstruction one = given(scene);
+  turn(one.views[4], 10, {0, 1, 0});
+  EXPECT_FALSE(judge(scene, one).blocks);
+}
+
 TEST(PhotoCheck, PosesThatAreAllALittleOffAreImpreciseAndNoneIsNamed) {
   const FeatureScene scene = testing_orbit::described_scene();
   Reconstruction off = given(scene);
