@@ -71,6 +71,8 @@ void add_poses(Settings& settings, PoseOptions& poses) {
                "Poses that the session carries replace the estimate");
   settings.add("poses.check_known_poses", poses.check_known_poses,
                "Such poses are held against the images first");
+  settings.add("poses.check_mirrored", poses.check_mirrored,
+               "Thermal images that fit better mirrored left to right are refused");
   settings.add("poses.use_tracking_frames", poses.use_tracking_frames,
                "Thermal frames recorded between stations tie neighbours together");
   settings.add("poses.max_image_side_px", poses.max_image_side_px,

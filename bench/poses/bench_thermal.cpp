@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON]
-// [--focal-error RELATIVE] [--views] [--attempts]
+// [--focal-error RELATIVE] [--mirrored] [--views] [--attempts]
 // The thermal pose stage alone, on what an earlier run left in its folder RUN (poses_visible,
 // train_visible), so that one stage can be judged without the others. GROUND_TRUTH serves the
 // comparison only. --tracking adds frames recorded between the stations, --focal-error 0.03 makes
-// the thermal focal length known 3 % too long, --views prints each view, --attempts sets what
-// COLMAP, the scene's lines and its renders give alone beside each other, with their time.
+// the thermal focal length known 3 % too long, --mirrored turns the thermal images round, --views
+// prints each view, --attempts sets what COLMAP, the scene's lines and its renders give alone
+// beside each other, with their time.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -18,6 +19,7 @@
 
 #include "bench/poses/misalignment.hpp"
 #include "core/formats/colmap_model.hpp"
+#include "core/image/image_io.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/clock.hpp"
 #include "core/system/cpu.hpp"
@@ -36,7 +38,7 @@ namespace fs = std::filesystem;
 struct Arguments {
   fs::path session, run, truth, tracking;
   double focal_error = 0;
-  bool views = false, attempts = false;
+  bool views = false, attempts = false, mirrored = false;
 };
 
 Arguments arguments_of(int argc, char** argv) {
@@ -50,6 +52,8 @@ Arguments arguments_of(int argc, char** argv) {
       arguments.attempts = true;
     } else if (word == "--tracking" && i + 1 < argc) {
       arguments.tracking = argv[++i];
+    } else if (word == "--mirrored") {
+      arguments.mirrored = true;
     } else if (word == "--focal-error" && i + 1 < argc) {
       arguments.focal_error = std::strtod(argv[++i], nullptr);
     } else {
@@ -93,8 +97,27 @@ void print_attempts(const scenes::Scene& scene, const VisibleScene& seen,
   print_attempt("lines, then renders and temperatures", scene, &seen, options);
 }
 
+/// The session in another folder, its thermal images turned round left to right.
+Status mirror_thermal(const fs::path& folder, Session& session) {
+  for (const FrameRecord& frame : session.frames) {
+    std::error_code ignored;
+    fs::create_directories((folder / frame.file).parent_path(), ignored);
+    if (frame.modality == Modality::visible) {
+      fs::create_symlink(fs::absolute(session.folder / frame.file), folder / frame.file, ignored);
+      continue;
+    }
+    ORBITFUSE_ASSIGN(cv::Mat kelvin, read_thermal_k(session.folder / frame.file));
+    cv::flip(kelvin, kelvin, 1);
+    ORBITFUSE_TRY(write_thermal_tiff(folder / frame.file, kelvin));
+  }
+  session.folder = folder;
+  return {};
+}
+
 Status run(const Arguments& arguments) {
   ORBITFUSE_ASSIGN(scenes::Scene scene, scenes::run_scene(arguments.session, arguments.truth));
+  const test::TempFolder other;
+  if (arguments.mirrored) ORBITFUSE_TRY(mirror_thermal(other.path(), scene.session));
   if (!arguments.tracking.empty()) scenes::add_tracking(scene, arguments.tracking);
   for (DeviceInfo& device : scene.session.devices)
     if (device.modality == Modality::thermal && device.lens.focal_px)
@@ -170,7 +193,7 @@ int main(int argc, char** argv) {
   if (arguments.truth.empty()) {
     std::fputs(
         "bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON] [--focal-error "
-        "RELATIVE] [--views] [--attempts]\n",
+        "RELATIVE] [--mirrored] [--views] [--attempts]\n",
         stderr);
     return 2;
   }

@@ -10,7 +10,7 @@
 namespace orbitfuse {
 namespace {
 
-constexpr int recorded_width_px = 96;  // 24 views are half a picture
+constexpr int recorded_width_px = 64;  // 24 views are a fifth of a picture
 constexpr int samples_along_width = 40;
 // Between the rays of both views to a point: a surface's other side is more than 90 degrees off.
 constexpr double least_cosine = 0.5;

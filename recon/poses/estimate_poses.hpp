@@ -28,6 +28,9 @@ struct PoseOptions {
   /// They are held against the images first: poses of other images or of another lens would spoil
   /// all that follows without a word.
   bool check_known_poses = true;
+  /// Thermal images that fit the visible scene better mirrored are refused: no other check would
+  /// find that the heat is on the object's wrong side.
+  bool check_mirrored = true;
   /// Thermal frames recorded between stations tie neighbouring stations together.
   bool use_tracking_frames = true;
   std::uint64_t seed = 1;

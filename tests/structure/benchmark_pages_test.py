@@ -16,6 +16,7 @@ WITHOUT_PLOT = {
     "fuzzing.md": "runs of a fuzzer measure how fast a parser is",
     "hostile.md": "says what the program answers",
     "input/known_poses.md": "mistakes that are seen or not",
+    "input/mirrored.md": "refused or not",
     "run_real.md": "what came of four recordings, without truth",
     "stability.md": "cases that hold or don't",
 }

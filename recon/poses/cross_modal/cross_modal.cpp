@@ -11,6 +11,7 @@
 #include "core/system/trace.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/poses/cross_modal/edge_lines.hpp"
+#include "recon/poses/cross_modal/mirrored_views.hpp"
 #include "recon/poses/cross_modal/orbit_frames.hpp"
 #include "recon/poses/cross_modal/orbit_selection.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
@@ -172,13 +173,29 @@ void doubt_all(double lead, RenderAlignment& rendered) {
                                   lead)};
 }
 
+/// Refused as what they are: poses of mirrored views pass every other check.
+Status check_mirrored(const SceneRenderer& renderer, const ChosenOrbit& chosen,
+                      const Progress& progress, PlacedViews& placed) {
+  ORBITFUSE_ASSIGN(const std::optional<MirroredSupport> mirrored,
+                   support_if_mirrored(renderer, chosen, progress));
+  if (!mirrored) return {};
+  placed.gates["mirrored_lead_standard_errors"] = mirrored->lead_standard_errors;
+  if (!mirrored->told()) return {};
+  return fail(ErrorKind::input, "thermal images",
+              fmt::format("mirrored left to right against the photos: so turned round they fit the "
+                          "visible scene {:.2f} times as well ({:.1f} standard errors)",
+                          mirrored->ratio, mirrored->lead_standard_errors),
+              "mirror the files back (or the photos, if those are), turn off the camera's setting, "
+              "and import again; poses.check_mirrored = false (--set) takes them as they are");
+}
+
 /// Places the views against renders: the hypothesis and the starts, then each view to the end, then
 /// the frames recorded between the stations, then the verdicts.
 Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene& visible,
                                      const Evidence& evidence,
                                      const std::vector<OrbitHypothesis>& hypotheses,
                                      const std::vector<const FrameRecord*>& tracking,
-                                     const Progress& progress) {
+                                     const PoseOptions& options, const Progress& progress) {
   progress.report({"poses.thermal", 2, 4, {}, "views of the scene"});
   ORBITFUSE_ASSIGN(const SceneRenderer renderer,
                    scene_of(visible, evidence.canonical_from_visible, progress));
@@ -198,6 +215,11 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
   const double lead =
       selected.lead_standard_errors.value_or(std::numeric_limits<double>::infinity());
   if (std::isfinite(lead)) placed.gates["start_lead_standard_errors"] = lead;
+  if (options.check_mirrored)
+    ORBITFUSE_TRY(check_mirrored(renderer,
+                                 {evidence.work.lines, evidence.search, orbit, blank,
+                                  hypotheses[selected.hypothesis], selected},
+                                 progress, placed));
   if (!(lead >= undecided_lead))
     return fail(ErrorKind::quality, "poses.thermal",
                 fmt::format("two starts of the orbit explain the thermal views about equally well "
@@ -309,7 +331,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   tell(1, "search of the orbit");
   ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses, search(evidence, progress));
   const Result<PlacedViews> placed =
-      place_by_renders(session, visible, evidence, hypotheses, orbit.tracking, progress);
+      place_by_renders(session, visible, evidence, hypotheses, orbit.tracking, options, progress);
   LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(wanted), 0};
   step.why = fmt::format("{} lines", evidence.work.lines.size());
   const auto finish = [&] {

@@ -82,12 +82,6 @@ class Selection {
   const std::vector<PosedView>& blank_;
 };
 
-double mean_support(const RenderAlignment& alignment) {
-  double sum = 0;
-  for (const RenderAlignedView& view : alignment.views) sum += view.support();
-  return sum / static_cast<double>(std::max<std::size_t>(alignment.views.size(), 1));
-}
-
 std::vector<Start> best_of_search(const OrbitHypothesis& hypothesis, std::size_t every) {
   std::vector<Start> starts;
   for (std::size_t i = 0; i < hypothesis.poses.size(); i += every)
@@ -163,6 +157,14 @@ bool is_rival(const OrbitHypothesis& a, const OrbitHypothesis& b) {
          std::abs(std::remainder(a.offset_deg - b.offset_deg, 360)) >= other_start_deg;
 }
 
+}  // namespace
+
+double mean_support(const RenderAlignment& alignment) {
+  double sum = 0;
+  for (const RenderAlignedView& view : alignment.views) sum += view.support();
+  return sum / static_cast<double>(std::max<std::size_t>(alignment.views.size(), 1));
+}
+
 double lead_standard_errors(const RenderAlignment& better, const RenderAlignment& other) {
   double sum = 0, squares = 0;
   for (std::size_t i = 0; i < better.views.size(); ++i) {
@@ -174,7 +176,12 @@ double lead_standard_errors(const RenderAlignment& better, const RenderAlignment
   return (sum / n) / std::sqrt(variance / n);
 }
 
-}  // namespace
+Result<RenderAlignment> open_orbit(const OrbitRefinement& refinement,
+                                   const std::vector<PosedView>& blank,
+                                   const OrbitHypothesis& hypothesis) {
+  const std::size_t every = blank.size() >= 2 * least_opened ? 2 : 1;
+  return Selection(refinement, blank).aligned(best_of_search(hypothesis, every), opening_rounds());
+}
 
 Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitViews& orbit,
                                         const std::vector<PosedView>& blank,
@@ -185,10 +192,8 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
   const Selection selection(refinement, blank);
   SelectedOrbit selected;
   std::vector<RenderAlignment> openings;
-  const std::size_t every = blank.size() >= 2 * least_opened ? 2 : 1;
   for (const OrbitHypothesis& hypothesis : hypotheses) {
-    ORBITFUSE_ASSIGN(RenderAlignment opened,
-                     selection.aligned(best_of_search(hypothesis, every), opening_rounds()));
+    ORBITFUSE_ASSIGN(RenderAlignment opened, open_orbit(refinement, blank, hypothesis));
     const double support = mean_support(opened);
     selected.supports.push_back(
         {hypothesis.offset_deg, hypothesis.radius, hypothesis.mirrored, support, false});
@@ -234,6 +239,7 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
       selected.lead_standard_errors =
           std::min(selected.lead_standard_errors.value_or(std::numeric_limits<double>::infinity()),
                    lead_standard_errors(selected.alignment, alignment));
+  selected.opening = std::move(openings[selected.hypothesis]);
   orbit.clockwise = hypotheses[selected.hypothesis].mirrored;
   orbit.stations = hypotheses[selected.hypothesis].stations;
   return selected;

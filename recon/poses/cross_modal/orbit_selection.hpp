@@ -24,10 +24,23 @@ struct SelectedOrbit {
   RenderAlignment alignment;                ///< to about a degree
   std::size_t hypothesis = 0;               ///< index of the chosen one
   std::vector<HypothesisSupport> supports;  ///< of each, in the search's order
+  RenderAlignment opening;                  ///< of the chosen one: open_orbit()
   /// How far the best one leads the next that starts elsewhere or turns the other way, taken to the
   /// same end: mean difference of the views' supports in its own standard errors. None: no rival.
   std::optional<double> lead_standard_errors;
 };
+
+/// Over the views.
+double mean_support(const RenderAlignment& alignment);
+
+/// Mean difference of the same views' supports, in its own standard errors.
+double lead_standard_errors(const RenderAlignment& better, const RenderAlignment& other);
+
+/// Some of the views, enough to tell hypotheses apart, at the search's best places after two
+/// rounds. Errors: the renderer's, cancelled.
+Result<RenderAlignment> open_orbit(const OrbitRefinement& refinement,
+                                   const std::vector<PosedView>& blank,
+                                   const OrbitHypothesis& hypothesis);
 
 /// The best supported hypothesis, with the best supported of several starts of each view: its own
 /// best places in the search's table, and its loop's nominal place a little before, at and after
