@@ -76,7 +76,7 @@ void add_common(CLI::App& app, CommonOptions& common, const CommonUse& use) {
     app.add_flag("--force", common.force,
                  use.resume ? "Run again although nothing changed; results of another session in "
                               "--out are removed"
-                            : "Write over what --out names")
+                            : "Write over a file that is there")
         ->group(common_group);
   if (use.resume)
     app.add_flag("--resume", common.resume, "Go on where an interrupted run stopped")

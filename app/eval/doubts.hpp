@@ -10,8 +10,9 @@
 // A truth of another scene, or of this one in another order, gives figures too.
 namespace orbitfuse::eval {
 
-/// Why `error`, that of `pairs` in the order of their names, may say nothing of the poses: it is
-/// larger than a run passes without a warning of its own. Says so where another order would fit.
+/// Why `error`, that of `pairs` in the order of capture, may say nothing of the poses: it is larger
+/// than a run passes without a warning of its own. Of up to 150 pairs it says so where another
+/// order would fit.
 std::optional<std::string> doubt_of_truth(const std::vector<PosePair>& pairs,
                                           const PoseError& error);
 

@@ -247,9 +247,10 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
   if (sums.visible > 0) {
     const double psnr_db = sums.visible_psnr / sums.visible;
     result["visible_psnr_db"] = psnr_db;
-    ORBITFUSE_ASSIGN(const stages::TrainedFrames trained,
-                     stages::load_trained_frames(run.out / "train_visible"));
-    if (const auto doubt = doubt_of_test_views(psnr_db, trained.heldout_psnr_db)) run.warn(*doubt);
+    const auto trained = stages::load_trained_frames(run.out / "train_visible");
+    if (trained)
+      if (const auto doubt = doubt_of_test_views(psnr_db, trained->heldout_psnr_db))
+        run.warn(*doubt);
   }
   if (sums.thermal > 0) {
     result["temperature_mae_c"] = sums.mae_k / sums.thermal;

@@ -113,9 +113,9 @@ Result<FieldSurface> surface_of_run(const view::FinishedRun& run, const SurfaceR
   if (surface || request.crop != Crop::box || surface.error().kind != ErrorKind::quality)
     return surface;
   const auto object = object_box(cameras);
-  return fail(ErrorKind::usage, "--crop-box", "no surface in it: " + surface.error().found,
-              object ? "the cameras look at " + words_of(*object)
-                     : "give a box round what the cameras look at");
+  return fail(ErrorKind::usage, "--crop-box", surface.error().found,
+              object ? surface.error().remedy + "; the cameras look at " + words_of(*object)
+                     : surface.error().remedy);
 }
 
 std::string surface_key(const view::FinishedRun& run, const SurfaceRequest& request) {

@@ -52,8 +52,8 @@ Status write_surface(const std::filesystem::path& file, const view::FinishedRun&
                      const FieldSurface& surface, const ExportFrame& frame,
                      const FileOptions& options);
 
-/// Whether something lies at the file's place, or its sidecar's, that write_surface() did not leave
-/// there as it is now: a user's own, or an export that was worked on since.
+/// Whether something lies at the file's place, or its sidecar's, that no finished write_surface()
+/// left there: a user's own, or an export that was worked on since.
 bool holds_other_work(const std::filesystem::path& file);
 
 /// In lower case: A.GLB is a .glb.

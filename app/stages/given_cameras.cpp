@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <set>
 
@@ -14,9 +15,16 @@ namespace {
 
 constexpr double max_pixels = 64e6;  // a view is held whole, with depth and opacity
 
+/// "1" and "nan" would take the place of numbers where X,Y,Z or VIEW,U,V is asked.
+bool is_a_number(const std::string& name) {
+  double value = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), value);
+  return error != std::errc::invalid_argument && end == name.data() + name.size();
+}
+
 bool fits_a_file_name(const std::string& name) {
   constexpr std::size_t longest = 100;
-  return !name.empty() && name.size() <= longest && name.front() != '.' &&
+  return !name.empty() && !is_a_number(name) && name.size() <= longest && name.front() != '.' &&
          std::all_of(name.begin(), name.end(), [](unsigned char c) {
            return c > ' ' && c != 0x7f && c != '/' && c != '\\' && c != '"' &&
                   c != ',';  // VIEW,U,V

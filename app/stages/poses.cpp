@@ -142,6 +142,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
       stage.uses.push_back("train_visible");
   }
   stage.options = in.config->settings().to_json("poses");
+  if (visible) stage.options.erase("check_mirrored");  // asked of thermal images alone
   stage.options["seed"] = in.config->seed;
   // Names and times of photos, and what the user said of the cameras, are in no frame's content.
   if (!visible)

@@ -183,6 +183,7 @@ Error as_fuse_key(Error error) {
   std::string key = error.where;
   if (const auto at = key.find(".smoother"); at != std::string::npos) key.erase(at, 9);
   std::replace(key.begin(), key.end(), '.', '_');
+  if (key == "palette") key = "heat_palette or fuse.overlay_palette";
   error.where = "fuse." + key;
   return error;
 }

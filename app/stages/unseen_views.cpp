@@ -2,22 +2,16 @@
 #include "app/stages/unseen_views.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
+
+#include "core/first_names.hpp"
 
 namespace orbitfuse::stages {
 namespace {
 
 constexpr double least_surface = 0.01, least_seen = 0.5;
-
-/// "a, b, c and 5 more".
-std::string some_of(const std::vector<std::string>& words) {
-  constexpr std::size_t most = 6;
-  if (words.size() <= most) return fmt::format("{}", fmt::join(words, ", "));
-  return fmt::format("{} and {} more", fmt::join(words.begin(), words.begin() + most, ", "),
-                     words.size() - most);
-}
+constexpr std::size_t most_named = 6;
 
 }  // namespace
 
@@ -42,13 +36,13 @@ void UnseenViews::tell(const std::string& frame, pipeline::StageOutput& output) 
           ? fmt::format("; given cameras stand in the world of OUT/{}/transforms.json", frame)
           : "";
   if (!empty.empty())
-    output.warnings.push_back(
-        fmt::format("new views that show nothing of the scene: {}{}", some_of(empty), in_frame));
+    output.warnings.push_back(fmt::format("new views that show nothing of the scene: {}{}",
+                                          first_names(empty, most_named), in_frame));
   if (!unseen.empty())
     output.warnings.push_back(fmt::format(
         "new views of what no recorded view saw from near there, which the field invents: {} of "
         "their surface was seen{}",
-        some_of(unseen), in_frame));
+        first_names(unseen, most_named), in_frame));
 }
 
 }  // namespace orbitfuse::stages

@@ -208,7 +208,7 @@ Status check_target(const fs::path& out, const fs::path& file, bool force) {
   ORBITFUSE_TRY(pipeline::check_out_file(file));
   if (force || !holds_other_work(file)) return {};
   return fail(ErrorKind::usage, "--to",
-              "'" + file.string() + "', where something is that no export left there",
+              "'" + file.string() + "', where something is that no finished export left there",
               "name another file, or write over it and its .json: --force");
 }
 

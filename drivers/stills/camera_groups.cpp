@@ -12,7 +12,7 @@ namespace {
 /// A focal length in other units than pixels shows as an angle that no lens has.
 Status check_angle(const std::optional<double>& focal_px, const StillPhoto& still,
                    const std::string& where) {
-  constexpr double narrowest_deg = 0.5, widest_deg = 150;
+  constexpr double narrowest_deg = 0.5, widest_deg = 130;
   if (!focal_px) return {};
   const int across = std::max(still.size.width, still.size.height);
   Camera camera;
@@ -21,8 +21,9 @@ Status check_angle(const std::optional<double>& focal_px, const StillPhoto& stil
   const double angle_deg = camera.horizontal_fov_deg();
   if (angle_deg >= narrowest_deg && angle_deg <= widest_deg) return {};
   return fail(ErrorKind::usage, where,
-              fmt::format("a focal length of {:g} px, with which {} pixels span {:.3g} degrees",
-                          *focal_px, across, angle_deg),
+              fmt::format("a focal length of {:g} px, with which the {} pixels of {} span {:.3g} "
+                          "degrees",
+                          *focal_px, across, still.described(), angle_deg),
               "give it in pixels: millimetres times the image's width in pixels, by the sensor's "
               "in millimetres");
 }
@@ -33,7 +34,7 @@ Result<CameraGroup*> CameraGroups::of(StillPhoto& still, const Source& source) {
   const Modality modality = still.camera.modality;
   const auto& focal =
       modality == Modality::visible ? options_.visible_focal_px : options_.thermal_focal_px;
-  ORBITFUSE_TRY(check_angle(focal, still, source.short_name()));
+  ORBITFUSE_TRY(check_angle(focal, still, fmt::format("--{}-focal-px", name(modality))));
   if (focal) still.camera.lens.focal_px = focal;
   const std::string key = still.key();
   for (CameraGroup& group : groups_) {

@@ -115,11 +115,9 @@ void say_apart(const TemperatureReading& reading, std::vector<std::string>& note
                         text.empty() ? "" : ", ", celsius_from_kelvin(reading.field_k),
                         reading.uncertainty_k);
   if (text.empty())
-    text = fmt::format("+- {:.1f}, because {}", reading.uncertainty_k,
-                       reading.spread_k > 0.5 * reading.uncertainty_k
-                           ? fmt::format("its frames differ by {:.1f} K", reading.spread_k)
-                           : "what lies beside it is much warmer or colder, and a pose a pixel off "
-                             "shows that");
+    text = fmt::format(
+        "+- {:.1f}{}", reading.uncertainty_k,
+        reading.frames.size() > 1 ? fmt::format(", its frames {:.1f} K apart", high - low) : "");
   if (most > decides && reading.frames.size() > 1)
     text += fmt::format(", and one frame decides ({} of the weight)", percent(most));
   notes.push_back(text + ": the place is small, at an edge or seen from the side");
@@ -229,6 +227,10 @@ Result<CommonView> common_view(const ThermalScene& scene, const Request& request
 Result<Answer> measure_polygon(const ThermalScene& scene, const Request& request,
                                const Reradiometry& radiometry, const Progress& progress) {
   ORBITFUSE_ASSIGN(const CommonView common, common_view(scene, request, progress));
+  // Of points the outline may cross itself in a view that its corners were not chosen in.
+  if (std::holds_alternative<PixelPlace>(request.places[0]) && crosses_itself(common.pixels))
+    return fail(ErrorKind::input, "polygon in " + common.view->name, "its sides cross each other",
+                "give its corners in their order round it");
   ORBITFUSE_ASSIGN(const auto points,
                    polygon_samples(scene, *common.view, common.pixels, progress));
   ORBITFUSE_ASSIGN(Answer answer, measure_points(scene, points, radiometry,

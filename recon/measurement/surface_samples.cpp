@@ -91,7 +91,8 @@ double turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vec
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
 
-/// Whether two sides cross, so that parts of what was gone round count as outside.
+}  // namespace
+
 bool crosses_itself(const std::vector<Eigen::Vector2d>& corners) {
   const std::size_t n = corners.size();
   for (std::size_t i = 0; i < n; ++i)
@@ -102,8 +103,6 @@ bool crosses_itself(const std::vector<Eigen::Vector2d>& corners) {
     }
   return false;
 }
-
-}  // namespace
 
 double object_radius(const ThermalScene::Middle& middle) { return object_reach * middle.radius; }
 
@@ -144,9 +143,6 @@ Result<std::vector<SurfacePoint>> polygon_samples(const ThermalScene& scene, con
     return fail(ErrorKind::input, "polygon in " + view.name, "it has no area within the picture",
                 fmt::format("choose corners within 0..{} and 0..{}", view.camera.width,
                             view.camera.height));
-  if (crosses_itself(corners))
-    return fail(ErrorKind::input, "polygon in " + view.name, "its sides cross each other",
-                "give its corners in their order round it");
   // The polygon's part of the picture, with fewer pixels where it is large.
   const double factor = std::min(1.0, polygon_rays / size.maxCoeff());
   Camera part = view.camera;

@@ -23,9 +23,11 @@ Result<std::vector<SurfacePoint>> object_samples(const ThermalScene& scene,
 /// Its reach: no point of it is farther from scene.middle().
 double object_radius(const ThermalScene::Middle& middle);
 
+/// Whether two sides cross, so that parts of what was gone round count as outside.
+bool crosses_itself(const std::vector<Eigen::Vector2d>& corners);
+
 /// Within a polygon in a view, at most 64 rays along its longer side, weighted by area. Pixels
-/// where the field has no surface are left out. Input error: the polygon lies outside the picture,
-/// or its sides cross.
+/// where the field has no surface are left out. Input error: the polygon lies outside the picture.
 Result<std::vector<SurfacePoint>> polygon_samples(const ThermalScene& scene, const PosedView& view,
                                                   const std::vector<Eigen::Vector2d>& corners,
                                                   const Progress& progress);

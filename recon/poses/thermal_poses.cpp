@@ -95,16 +95,18 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   if (!poses && poses.error().kind == ErrorKind::cancelled) return poses;
   // An answer in a world of its own is worth less than poses that may be right in this one.
   const bool found = poses && poses->shares_visible_frame;
-  if (!found)
-    poses = in_doubt(std::move(known),
-                     poses ? "placed in a world of their own alone" : poses.error().found);
+  const std::string why = found   ? ""
+                          : poses ? "but in a world of their own"
+                                  : poses.error().where + ": " + poses.error().found;
+  if (!found) poses = in_doubt(std::move(known), why);
   poses->warnings.insert(
       poses->warnings.begin(),
       fmt::format(
           "the visible scene doesn't confirm the known thermal poses{}: {}; correct them, or "
           "set poses.check_known_poses = false to take them as they are",
           found ? ", which were estimated from the images instead"
-                : ", and the images alone place no views: they are all in doubt",
+                : fmt::format(", and the images alone place no views ({}): they are all in doubt",
+                              why),
           contradiction->words));
   return poses;
 }

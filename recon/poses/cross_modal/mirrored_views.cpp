@@ -12,6 +12,8 @@ namespace {
 constexpr double distance_reach = 1.13;
 /// Views that are not mirrored lead by more at the first look.
 constexpr double undecided_lead = 1.5;
+/// Of fewer the true start may be missed, and the spread of their supports is itself chance.
+constexpr std::size_t least_views = 16;
 
 Camera mirrored(Camera camera) {
   camera.cx = camera.width - camera.cx;
@@ -37,6 +39,7 @@ Result<std::optional<MirroredSupport>> support_if_mirrored(const SceneRenderer& 
                                                            const ChosenOrbit& chosen,
                                                            const Progress& progress) {
   const TraceSpan span("mirrored views");
+  if (chosen.blank.size() < least_views) return std::nullopt;
   OrbitSearchOptions options;
   options.nearest = chosen.hypothesis.radius / options.radius_ratio;
   options.farthest = chosen.hypothesis.radius * distance_reach;

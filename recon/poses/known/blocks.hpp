@@ -15,7 +15,8 @@ struct Blocks {
   Held across;                           ///< matches between them
 };
 
-/// Nothing where all views that can be told hang together, or what lies between sets is too little.
+/// Nothing where all views that can be told hang together, where what lies between sets is too
+/// little, and of less than nine frames.
 /// `all_off`: by how many times all poses are less precise than right ones, 1 or more.
 std::optional<Blocks> separate_blocks(const std::vector<PairMisses>& misses, int frames,
                                       double all_off);

@@ -26,15 +26,11 @@ std::vector<PairMisses> line_misses(const FeatureGraph& graph, const PairMatches
   return misses;
 }
 
-namespace {
-
 Held held_of(const PairMisses& misses, double px) {
   const auto held =
       std::count_if(misses.px.begin(), misses.px.end(), [px](float miss) { return miss <= px; });
   return {static_cast<std::size_t>(held), misses.px.size()};
 }
-
-}  // namespace
 
 Held held_within(const std::vector<PairMisses>& misses, double px) {
   Held sum;

@@ -27,6 +27,7 @@ struct Held {
     return all > 0 ? static_cast<double>(held) / static_cast<double>(all) : 0.0;
   }
 };
+Held held_of(const PairMisses& misses, double px);
 Held held_within(const std::vector<PairMisses>& misses, double px);
 
 /// By frame, of `frames`. Pairs with a frame that `without` marks don't count.

@@ -94,7 +94,7 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
   test::put(temp / "mine.ply", "a user's own");
   const Outcome kept = surface(temp / "mine.ply");
   EXPECT_EQ(kept.code, 2);
-  EXPECT_THAT(kept.err, HasSubstr("no export left there"));
+  EXPECT_THAT(kept.err, HasSubstr("no finished export left there"));
   EXPECT_EQ(orbitfuse_program({"export", out.string(), "--to", (temp / "mine.ply").string(),
                                "--force", "--dry-run"})
                 .code,

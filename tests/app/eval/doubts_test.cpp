@@ -56,7 +56,8 @@ TEST(DoubtOfTruth, AShiftedOrderIsNamed) {
     shifted[i].cam_from_truth = right[(i + 4) % right.size()].cam_from_truth;
   const auto said = doubt(shifted);
   ASSERT_TRUE(said);
-  EXPECT_THAT(*said, HasSubstr("with the truth's poses 8 frames further on they are 0.00 % off"));
+  EXPECT_THAT(*said,
+              HasSubstr("with the truth's poses 8 posed frames further on they are 0.00 % off"));
 }
 
 TEST(DoubtOfTestViews, OnlyWhereTheyAreMuchWorse) {

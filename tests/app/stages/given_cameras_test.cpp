@@ -43,6 +43,9 @@ TEST_F(GivenCamerasFile, ViewsAreCalledAsTheirFilesAre) {
   EXPECT_THAT(names({"images/front.png", "images/back.png"}), ElementsAre("front", "back"));
   EXPECT_THAT(names({"a/front.png", "b/front.png"}), ElementsAre("000", "001"));
   EXPECT_THAT(names({"a/front.png", "b/.png\n"}), ElementsAre("000", "001"));
+  for (const char* number : {"1", "-2.5", "nan", "inf", "1e999"})
+    EXPECT_THAT(names({"front.png", std::string(number) + ".png"}), ElementsAre("000", "001"))
+        << number;
   EXPECT_THAT(read({"a/front.png", "b/front.png"})->files,
               ElementsAre("a/front.png", "b/front.png"));
 }

@@ -89,8 +89,9 @@ TEST_F(HostileImport, AFocalLengthInMillimetresIsRefused) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::usage);
   EXPECT_THAT(refused.error().message(),
-              ::testing::AllOf(::testing::HasSubstr("a focal length of 4 px, with which"),
-                               ::testing::HasSubstr("millimetres times the image's width")));
+              ::testing::AllOf(
+                  ::testing::HasSubstr("--visible-focal-px: a focal length of 4 px, with which"),
+                  ::testing::HasSubstr("millimetres times the image's width")));
   options.visible_focal_px = 40;
   EXPECT_TRUE(import());
 }

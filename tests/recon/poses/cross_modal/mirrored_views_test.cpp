@@ -66,12 +66,12 @@ Result<std::optional<MirroredSupport>> support(bool both, bool mirrored) {
   std::vector<PosedView> blank;
   std::vector<SearchView> search;
   std::vector<Station> stations;
-  for (int i = 0; i < 12; ++i) {
+  for (int i = 0; i < 16; ++i) {
     Station station;
-    station.loop = i / 6, station.azimuth_deg = 60.0 * (i % 6);
+    station.loop = i / 8, station.azimuth_deg = 45.0 * (i % 8);
     OrbitPose pose;
     pose.azimuth_deg = station.azimuth_deg + 20 + (i % 2 == 0 ? 3 : -3);
-    pose.elevation_deg = i < 6 ? 12 : 28, pose.radius = radius;
+    pose.elevation_deg = i < 8 ? 12 : 28, pose.radius = radius;
     cv::Mat image = two_boxes(camera, cam_from_world_of(pose, camera), true, both).brightness;
     if (mirrored) cv::flip(image, image, 1);
     search.push_back({orientation_field(image, 1.0), camera});
