@@ -305,6 +305,7 @@ TEST_F(Run, GivenCamerasAreRenderedAsGiven) {
   auto cameras = read_transforms_json(out / "poses_visible/transforms.json");
   ASSERT_TRUE(cameras);
   cameras->frames.resize(1);
+  cameras->frames[0].file_path = "images/front.jpg";
   cameras->frames[0].camera = cameras->frames[0].camera.scaled_to(40, 30);
   ASSERT_TRUE(write_transforms_json(temp.path() / "cameras.json", *cameras));
   const Outcome outcome = run({"--cameras", (temp.path() / "cameras.json").string()}, {}, "render");
