@@ -57,8 +57,7 @@ std::optional<std::string> doubt_of_truth(const std::vector<PosePair>& pairs,
   if (!doubted(error)) return std::nullopt;
   return fmt::format(
       "{:.1f} % of the extent and {:.1f} degrees (median) off: the poses are wrong, or the truth "
-      "is "
-      "of another scene or in another order{}",
+      "is of another scene or in another order{}",
       error.ate_percent, error.rotation_median_deg, order_that_fits(pairs, error));
 }
 

@@ -7,6 +7,7 @@
 #include <charconv>
 #include <filesystem>
 #include <set>
+#include <string_view>
 
 #include "core/formats/transforms_json.hpp"
 
@@ -22,12 +23,13 @@ bool is_a_number(const std::string& name) {
   return error != std::errc::invalid_argument && end == name.data() + name.size();
 }
 
-bool fits_a_file_name(const std::string& name) {
+/// Of a file, and of a view in VIEW,U,V.
+bool fits_a_name(const std::string& name) {
   constexpr std::size_t longest = 100;
+  constexpr std::string_view unfit = "/\\\",\x7f";
   return !name.empty() && !is_a_number(name) && name.size() <= longest && name.front() != '.' &&
-         std::all_of(name.begin(), name.end(), [](unsigned char c) {
-           return c > ' ' && c != 0x7f && c != '/' && c != '\\' && c != '"' &&
-                  c != ',';  // VIEW,U,V
+         std::all_of(name.begin(), name.end(), [&](unsigned char c) {
+           return c > ' ' && unfit.find(static_cast<char>(c)) == std::string_view::npos;
          });
 }
 
@@ -37,7 +39,7 @@ std::vector<std::string> names_of(const std::vector<TransformsFrame>& frames) {
   for (const TransformsFrame& frame : frames)
     names.push_back(std::filesystem::path(frame.file_path).stem().string());
   if (std::set(names.begin(), names.end()).size() < names.size() ||
-      !std::all_of(names.begin(), names.end(), fits_a_file_name))
+      !std::all_of(names.begin(), names.end(), fits_a_name))
     for (std::size_t i = 0; i < names.size(); ++i) names[i] = fmt::format("{:03}", i);
   return names;
 }

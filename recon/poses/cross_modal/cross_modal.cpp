@@ -238,8 +238,8 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
   if (lens.guessed)
     placed.warnings.push_back(
         fmt::format("the thermal lens is unknown: 33 degrees were assumed to begin with, and "
-                    "{:.1f} found ({:.0f} "
-                    "px); give its focal length (import --thermal-focal-px) if you know it better",
+                    "{:.1f} found ({:.0f} px); give its focal length (import --thermal-focal-px) "
+                    "if you know it better",
                     lens.camera.horizontal_fov_deg(), lens.camera.fx));
   if (!tracking.empty())
     ORBITFUSE_TRY(pose_tracking(session, evidence.work, lens.camera, tracking, renderer, orbit,

@@ -11,9 +11,9 @@ namespace {
 /// Mirrored views stand about as far off: the object's size doesn't change.
 constexpr double distance_reach = 1.13;
 /// Views that are not mirrored lead by more at the first look.
-constexpr double undecided_lead = 1.5;
+constexpr double decided_at_first = 1.5;
 /// Of fewer the true start may be missed, and the spread of their supports is itself chance.
-constexpr std::size_t least_views = 16;
+constexpr std::size_t least_for_mirrored = 16;
 
 Camera mirrored(Camera camera) {
   camera.cx = camera.width - camera.cx;
@@ -39,7 +39,7 @@ Result<std::optional<MirroredSupport>> support_if_mirrored(const SceneRenderer& 
                                                            const ChosenOrbit& chosen,
                                                            const Progress& progress) {
   const TraceSpan span("mirrored views");
-  if (chosen.blank.size() < least_views) return std::nullopt;
+  if (chosen.blank.size() < least_for_mirrored) return std::nullopt;
   OrbitSearchOptions options;
   options.nearest = chosen.hypothesis.radius / options.radius_ratio;
   options.farthest = chosen.hypothesis.radius * distance_reach;
@@ -55,7 +55,8 @@ Result<std::optional<MirroredSupport>> support_if_mirrored(const SceneRenderer& 
   for (PosedView& view : blank) view.camera = mirrored(view.camera);
   ORBITFUSE_ASSIGN(const RenderAlignment opening,
                    open_orbit({renderer, orbit, progress}, blank, best.front()));
-  if (lead_standard_errors(opening, chosen.selected.opening) < -undecided_lead) return std::nullopt;
+  if (lead_standard_errors(opening, chosen.selected.opening) < -decided_at_first)
+    return std::nullopt;
   const auto selected = select_by_renders(renderer, orbit, blank, best, progress);
   if (!selected && selected.error().kind == ErrorKind::quality) return std::nullopt;
   if (!selected) return tl::unexpected(selected.error());

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <map>
-#include <numeric>
 #include <set>
 
 #include "recon/poses/index.hpp"
+#include "recon/poses/sfm/joined_sets.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -51,20 +51,14 @@ std::optional<Blocks> apart(std::vector<std::vector<int>> sets,
 std::optional<Blocks> separate_blocks(const std::vector<PairMisses>& misses, int frames,
                                       double all_off) {
   if (frames < least_frames) return std::nullopt;
-  std::vector<int> root(at(frames));
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int f) {
-    while (root[at(f)] != f) f = root[at(f)];
-    return f;
-  };
+  JoinedSets tied(frames);
   for (const PairMisses& of_pair : misses) {
     const Held held = held_of(of_pair, fits_px * all_off);
-    if (held.all < least_of_pair || held.share() < fits_share) continue;
-    const int a = find(of_pair.pair.first), b = find(of_pair.pair.second);
-    root[at(std::max(a, b))] = std::min(a, b);
+    if (held.all >= least_of_pair && held.share() >= fits_share)
+      tied.join(of_pair.pair.first, of_pair.pair.second);
   }
   std::vector<std::vector<int>> sets(at(frames));
-  for (int f = 0; f < frames; ++f) sets[at(find(f))].push_back(f);
+  for (int f = 0; f < frames; ++f) sets[at(tied.root(f))].push_back(f);
   sets.erase(std::remove_if(sets.begin(), sets.end(),
                             [](const auto& set) { return set.size() < least_of_block; }),
              sets.end());

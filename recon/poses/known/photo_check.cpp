@@ -187,8 +187,7 @@ std::string explanation(const PhotoJudgement& judged, const Reconstruction& give
                        judged.slip->words, percent(judged.slip->fit), fine_px);
   if (!judged.blocks) return {};
   std::string text =
-      "; it looks as if these sets of views, each right by itself, were of different "
-      "worlds:";
+      "; it looks as if these sets of views, each right by itself, were of different worlds:";
   for (const std::vector<int>& block : judged.blocks->frames)
     text += fmt::format(" {} from {} to {},", block.size(), given.views[at(block.front())].name,
                         given.views[at(block.back())].name);

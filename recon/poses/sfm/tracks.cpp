@@ -5,33 +5,16 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <tuple>
 
 #include "core/geometry/nearest_to_lines.hpp"
 #include "core/numeric/angle_units.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/index.hpp"
+#include "recon/poses/sfm/joined_sets.hpp"
 
 namespace orbitfuse {
 namespace {
-
-/// Sets of features that matches connect.
-class Sets {
- public:
-  explicit Sets(int count) : parent_(at(count)) { std::iota(parent_.begin(), parent_.end(), 0); }
-  int root(int i) {
-    while (parent_[at(i)] != i) i = parent_[at(i)] = parent_[at(parent_[at(i)])];
-    return i;
-  }
-  void join(int a, int b) {
-    a = root(a), b = root(b);
-    if (a != b) parent_[at(std::max(a, b))] = std::min(a, b);
-  }
-
- private:
-  std::vector<int> parent_;
-};
 
 using Features = std::vector<std::pair<int, int>>;
 
@@ -41,7 +24,7 @@ std::vector<Features> connected(const FeatureGraph& graph, const PairMatches& ma
   std::vector<int> first(at(graph.count()) + 1, 0);
   for (int f = 0; f < graph.count(); ++f)
     first[at(f + 1)] = first[at(f)] + static_cast<int>(graph.pixels[at(f)].cols());
-  Sets sets(first.back());
+  JoinedSets sets(first.back());
   for (const auto& [pair, list] : matches)
     if (poses[at(pair.first)] && poses[at(pair.second)])
       for (const auto& [a, b] : list)
