@@ -205,7 +205,8 @@ Status check_target(const fs::path& out, const fs::path& file, bool force) {
     return fail(ErrorKind::usage, "--to", "'" + file.string() + "', which is a folder",
                 "name a file");
   ORBITFUSE_TRY(check_outside_stages(out, "--to", file));
-  ORBITFUSE_TRY(pipeline::check_out_file(file));
+  for (const fs::path& made : {file, fs::path(file.string() + ".json")})
+    ORBITFUSE_TRY(pipeline::check_out_file(made));
   if (force || !holds_other_work(file)) return {};
   return fail(ErrorKind::usage, "--to",
               "'" + file.string() + "', where something is that no finished export left there",

@@ -124,6 +124,9 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
                                "--points", "--dry-run"})
                 .code,
             0);
+  fs::create_directory(temp / "beside.ply.json");
+  expect_refused({"export", out.string(), "--to", (temp / "beside.ply").string(), "--force"}, 3,
+                 "beside.ply.json");
   fs::create_directory(temp / "folder.ply");
   EXPECT_EQ(surface(temp / "folder.ply").code, 2);
   // One stage made anew: what stands on the one before is not mixed with it.
