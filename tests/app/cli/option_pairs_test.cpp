@@ -105,9 +105,9 @@ TEST(OptionPairs, RunsRendersAndCameras) {
 /// What every verb was offered once, and most passed over.
 TEST(OptionPairs, CommonOptionsOfOtherVerbs) {
   const std::vector<std::vector<std::string>> no_stages = {
-      {"inspect", "x"}, {"view", "x"},    {"measure", "x"}, {"export", "x"},
-      {"eval", "x"},    {"devices"},      {"farm", "x"},    {"doctor"},
-      {"import", "x"},  {"capture", "x"}, {"replay", "x"},  {"compare", "x", "y"}};
+      {"inspect", "x"}, {"view", "x"},   {"measure", "x"},     {"eval", "x"},
+      {"devices"},      {"farm", "x"},   {"doctor"},           {"import", "x"},
+      {"capture", "x"}, {"replay", "x"}, {"compare", "x", "y"}};
   for (const auto& verb : no_stages) expect_all_refused(verb, {{{"--force"}, "--force: "}});
   for (const char* verb : {"measure", "eval", "view"})
     expect_all_refused({verb},

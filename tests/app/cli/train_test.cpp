@@ -75,12 +75,22 @@ TEST_F(Train, MoreStepsGoOnFromTheResultAndForceDoesNot) {
 }
 
 TEST_F(Train, ABudgetEndsTheTrainingAndALargerOneGoesOn) {
-  ASSERT_EQ(run({"--modality", "visible", "--budget", "1.5s"}).code, 0);
+  const auto within = [this](double budget_s) {
+    return run({"--modality", "visible", "--budget", std::to_string(budget_s)});
+  };
+  double budget_s = 1.5;
+  Outcome outcome = within(budget_s);
+  // How long the first step takes to come is the machine's, and a shorter budget is refused.
+  for (; outcome.code != 0 && budget_s < 60; outcome = within(budget_s)) {
+    ASSERT_THAT(outcome.err, HasSubstr("were over before the first step"));
+    budget_s *= 2;
+  }
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
   const json short_run = stage().at("metrics");
   EXPECT_EQ(short_run.at("stop"), "budget");
-  const double spent_s = short_run.at("train_wall_s"), more_s = spent_s + 1;
-  EXPECT_GE(spent_s, 1.5);
-  ASSERT_EQ(run({"--modality", "visible", "--budget", std::to_string(more_s)}).code, 0);
+  const double spent_s = short_run.at("train_wall_s"), more_s = spent_s + budget_s;
+  EXPECT_GE(spent_s, budget_s);
+  ASSERT_EQ(within(more_s).code, 0);
   EXPECT_TRUE(extended());
   EXPECT_GE(stage().at("metrics").at("train_wall_s"), more_s - 1e-3);
   EXPECT_GT(stage().at("metrics").at("iterations"), short_run.at("iterations"));

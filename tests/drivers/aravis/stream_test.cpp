@@ -23,6 +23,7 @@ class AravisStream : public ::testing::Test {
     if (!camera.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
     options.camera = "127.0.0.1";
     options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+    options.buffers = 240;  // 4 s: a busy host that runs other tests loses no frame of its own
   }
   static GevOptions small() {
     GevOptions o;

@@ -136,16 +136,29 @@ TEST_P(DeviceTraining, PosesMoveAsOnTheProcessor) {
     const auto used = in_use();
     moved(there);
   }
-  double largest = 0, apart = 0;
+  // Over all views, for where one view ends is chaotic: the rounding of each kind of processor
+  // takes it elsewhere.
+  double here2 = 0, there2 = 0, both = 0;
   for (const TrainingView& view : data.views) {
     if (view.measure_only) continue;
-    const Rigid3d &a = here.at(view.name), &b = there.at(view.name);
-    largest = std::max(largest, rotation_angle_deg(a.rotation, view.cam_from_world.rotation));
-    apart = std::max(apart, rotation_angle_deg(a.rotation, b.rotation));
-    EXPECT_LT((camera_center(a) - camera_center(b)).norm(), 0.005) << view.name;
+    const auto turned = [&](const std::map<std::string, Rigid3d>& poses) -> Eigen::Vector3d {
+      const Eigen::AngleAxisd by(poses.at(view.name).rotation *
+                                 view.cam_from_world.rotation.inverse());
+      return by.angle() * by.axis();
+    };
+    here2 += turned(here).squaredNorm();
+    there2 += turned(there).squaredNorm();
+    both += turned(here).dot(turned(there));
+    EXPECT_LT((camera_center(here.at(view.name)) - camera_center(there.at(view.name))).norm(),
+              0.005)
+        << view.name;
   }
-  EXPECT_GT(largest, 0.08);
-  EXPECT_LT(apart, largest / 2);  // had the device moved none, this were the largest
+  const double here_rad = std::sqrt(here2), there_rad = std::sqrt(there2);
+  EXPECT_GT(here_rad, 0.002);
+  EXPECT_GT(there_rad, here_rad / 2);  // 0 had the device moved none
+  EXPECT_LT(there_rad, here_rad * 2);
+  // 0 had it turned them anyhow; .84 to .98 over five seeds.
+  EXPECT_GT(both / std::sqrt(here2 * there2), 0.6);
 }
 
 INSTANTIATE_TEST_SUITE_P(Every, DeviceTraining, ::testing::Values("emulated", "cuda"),
