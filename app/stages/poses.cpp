@@ -134,9 +134,9 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 19;  // known poses are held against the photos
+  stage.version = 20;  // worlds of cameras that were held on their side
   if (!visible) {
-    stage.version = 24;  // known poses are held against the visible scene
+    stage.version = 25;  // cameras held upside down or on their side
     stage.uses = {"poses_visible"};
     if (asks_for_renders(in.session->session, in.config->poses))
       stage.uses.push_back("train_visible");

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON]
-// [--focal-error RELATIVE] [--mirrored] [--views] [--attempts]
+// [--focal-error RELATIVE] [--mirrored] [--turned QUARTERS] [--views] [--attempts]
 // The thermal pose stage alone, on what an earlier run left in its folder RUN (poses_visible,
 // train_visible), so that one stage can be judged without the others. GROUND_TRUTH serves the
 // comparison only. --tracking adds frames recorded between the stations, --focal-error 0.03 makes
-// the thermal focal length known 3 % too long, --mirrored turns the thermal images round, --views
-// prints each view, --attempts sets what COLMAP, the scene's lines and its renders give alone
-// beside each other, with their time.
+// the thermal focal length known 3 % too long, --mirrored turns the thermal images round left to
+// right, --turned 2 as if the camera had been held upside down (1, 3: on its side), --views prints
+// each view, --attempts sets what COLMAP, the scene's lines and its renders give alone beside each
+// other, with their time.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -26,6 +27,7 @@
 #include "core/system/parallel.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
+#include "recon/poses/cross_modal/quarter_turn.hpp"
 #include "recon/poses/estimate_poses.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -39,6 +41,7 @@ struct Arguments {
   fs::path session, run, truth, tracking;
   double focal_error = 0;
   bool views = false, attempts = false, mirrored = false;
+  QuarterTurn turned;
 };
 
 Arguments arguments_of(int argc, char** argv) {
@@ -54,6 +57,8 @@ Arguments arguments_of(int argc, char** argv) {
       arguments.tracking = argv[++i];
     } else if (word == "--mirrored") {
       arguments.mirrored = true;
+    } else if (word == "--turned" && i + 1 < argc) {
+      arguments.turned.clockwise = std::atoi(argv[++i]) & 3;
     } else if (word == "--focal-error" && i + 1 < argc) {
       arguments.focal_error = std::strtod(argv[++i], nullptr);
     } else {
@@ -97,9 +102,9 @@ void print_attempts(const scenes::Scene& scene, const VisibleScene& seen,
   print_attempt("lines, then renders and temperatures", scene, &seen, options);
 }
 
-/// The session in another folder, its thermal images turned round left to right.
-Status mirror_thermal(const fs::path& folder, Session& session) {
-  for (const FrameRecord& frame : session.frames) {
+/// The session in another folder, its thermal images mirrored left to right, then turned.
+Status turn_thermal(const fs::path& folder, const Arguments& arguments, Session& session) {
+  for (FrameRecord& frame : session.frames) {
     std::error_code ignored;
     fs::create_directories((folder / frame.file).parent_path(), ignored);
     if (frame.modality == Modality::visible) {
@@ -107,17 +112,26 @@ Status mirror_thermal(const fs::path& folder, Session& session) {
       continue;
     }
     ORBITFUSE_ASSIGN(cv::Mat kelvin, read_thermal_k(session.folder / frame.file));
-    cv::flip(kelvin, kelvin, 1);
+    if (arguments.mirrored) cv::flip(kelvin, kelvin, 1);
+    kelvin = upright(arguments.turned, kelvin);
+    frame.width = kelvin.cols, frame.height = kelvin.rows;
     ORBITFUSE_TRY(write_thermal_tiff(folder / frame.file, kelvin));
   }
   session.folder = folder;
   return {};
 }
 
+/// Poses of the images as they were before they were turned.
+Reconstruction turned_back(QuarterTurn turned, Reconstruction poses) {
+  for (PosedView& view : poses.views) view = as_taken(turned, view);
+  return poses;
+}
+
 Status run(const Arguments& arguments) {
   ORBITFUSE_ASSIGN(scenes::Scene scene, scenes::run_scene(arguments.session, arguments.truth));
   const test::TempFolder other;
-  if (arguments.mirrored) ORBITFUSE_TRY(mirror_thermal(other.path(), scene.session));
+  if (arguments.mirrored || arguments.turned.clockwise != 0)
+    ORBITFUSE_TRY(turn_thermal(other.path(), arguments, scene.session));
   if (!arguments.tracking.empty()) scenes::add_tracking(scene, arguments.tracking);
   for (DeviceInfo& device : scene.session.devices)
     if (device.modality == Modality::thermal && device.lens.focal_px)
@@ -163,17 +177,16 @@ Status run(const Arguments& arguments) {
   fmt::print("{}/{} posed, {:.1f} s, {:.1f} CPU s, {:.1f} of them in {} renders\n",
              poses.reconstruction.views.size(), poses.frame_count, wall, cpu_seconds() - before,
              rendering_s, renders);
+  const Reconstruction thermal = turned_back(arguments.turned, poses.reconstruction);
   const PoseError error = scenes::pose_error(
-      poses.reconstruction, poses.shares_visible_frame ? seen.reconstruction : poses.reconstruction,
-      scene.truth);
+      thermal, poses.shares_visible_frame ? seen.reconstruction : thermal, scene.truth);
   fmt::print(
       "centres ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; rotation mean "
       "{:.3f}, median {:.3f}, worst {:.3f} deg\n",
       error.ate_percent, error.ate_median_percent, error.ate_max_percent, error.rotation_mean_deg,
       error.rotation_median_deg, error.rotation_max_deg);
-  ORBITFUSE_ASSIGN(
-      scenes::Misalignment apart,
-      scenes::misalignment(scene, seen.reconstruction, poses.reconstruction, seen.renderer));
+  ORBITFUSE_ASSIGN(scenes::Misalignment apart,
+                   scenes::misalignment(scene, seen.reconstruction, thermal, seen.renderer));
   fmt::print(
       "rendered pairs of {} test views: median misalignment {:.2f} px at 640 wide, 90 % within "
       "{:.2f} px\n",
@@ -193,7 +206,7 @@ int main(int argc, char** argv) {
   if (arguments.truth.empty()) {
     std::fputs(
         "bench_thermal SESSION RUN GROUND_TRUTH [--tracking TRACKING_JSON] [--focal-error "
-        "RELATIVE] [--mirrored] [--views] [--attempts]\n",
+        "RELATIVE] [--mirrored] [--turned QUARTERS] [--views] [--attempts]\n",
         stderr);
     return 2;
   }

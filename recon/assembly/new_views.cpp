@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/geometry/level_cameras.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "core/geometry/nearest_to_lines.hpp"
 #include "core/numeric/angle_units.hpp"
@@ -39,6 +40,17 @@ Camera render_camera(const std::vector<PosedView>& posed, int width_px) {
   return at_width(posed[posed.size() / 2].camera.without_distortion(), width_px);
 }
 
+/// New views of an orbit are upright, however the cameras were held.
+Camera upright_camera(const std::vector<PosedView>& posed, int width_px) {
+  Camera camera = posed[posed.size() / 2].camera.without_distortion();
+  if (held_on_side(cameras_of(posed))) {
+    std::swap(camera.width, camera.height);
+    std::swap(camera.fx, camera.fy);
+    std::swap(camera.cx, camera.cy);
+  }
+  return at_width(camera, width_px);
+}
+
 NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& orbit,
                      const NewViewOptions& options) {
   const double elevation = options.elevation_deg.value_or(orbit.elevation_deg) * radians_per_degree;
@@ -50,7 +62,7 @@ NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& o
     const Eigen::Vector3d out =
         std::cos(elevation) * (std::cos(azimuth) * orbit.first + std::sin(azimuth) * side) +
         std::sin(elevation) * orbit.up;
-    result.views.push_back({fmt::format("{:03}", i), render_camera(posed, options.width_px),
+    result.views.push_back({fmt::format("{:03}", i), upright_camera(posed, options.width_px),
                             look_at(orbit.center + radius * out, orbit.center, orbit.up)});
   }
   result.described = fmt::format("orbit of {} views, elevation {:.0f}°", options.views,
@@ -96,12 +108,14 @@ Result<OrbitGeometry> orbit_geometry(const std::vector<PosedView>& views) {
     axes.add(camera_center(v.cam_from_world), axis(v, 2));
     mean_up -= axis(v, 1);
   }
-  if (!(axes.crossing() > 1e-6) || mean_up.norm() < 1e-9)
+  const std::vector<Rigid3d> cameras = cameras_of(views);
+  const bool on_side = held_on_side(cameras);
+  if (!(axes.crossing() > 1e-6) || (!on_side && mean_up.norm() < 1e-9))
     return fail(ErrorKind::input, "cameras", "all look in one direction: their axes meet nowhere",
                 "render along their path: --path path");
   OrbitGeometry orbit;
   orbit.center = axes.point();
-  orbit.up = mean_up.normalized();
+  orbit.up = on_side ? up_direction(cameras) : mean_up.normalized();
 
   std::vector<double> radii, elevations, azimuths;
   for (const PosedView& v : views) {

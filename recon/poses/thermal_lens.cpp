@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/thermal_lens.hpp"
 
+#include <algorithm>
+
 #include "recon/poses/frame_camera.hpp"
 
 namespace orbitfuse {
 
 LensGuess lens_of(const Session& session, const FrameRecord& frame) {
-  constexpr double usual_focal_by_width = 1.7, guessed_sigma = 0.3;
+  constexpr double usual_focal_by_side = 1.7, guessed_sigma = 0.3;
   LensGuess guess;
-  guess.camera = prior_camera(session, frame, usual_focal_by_width * frame.width);
+  guess.camera =
+      prior_camera(session, frame, usual_focal_by_side * std::max(frame.width, frame.height));
   if (calibrated_camera(session, frame.device, frame.width, frame.height)) {
     guess.focal_relative_sigma = guess.radial_sigma = 0;
     return guess;

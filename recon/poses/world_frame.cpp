@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "recon/poses/world_frame.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 
-#include "core/geometry/nearest_to_lines.hpp"
+#include "core/geometry/level_cameras.hpp"
 #include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 
@@ -18,10 +17,6 @@ namespace {
 constexpr double nominal_sigma_deg = 8;
 
 double wrapped_deg(double angle) { return std::remainder(angle, 360.0); }
-
-Eigen::Vector3d axis_in_world(const PosedView& view, const Eigen::Vector3d& axis_in_cam) {
-  return view.cam_from_world.rotation.conjugate() * axis_in_cam;
-}
 
 /// Offset minimising the sum of absolute wrapped residuals; candidates are the residuals.
 double robust_offset_deg(const std::vector<double>& differences) {
@@ -41,43 +36,6 @@ bool all_have_stations(const std::vector<const FrameRecord*>& frames) {
                      [](const FrameRecord* f) { return f->station.has_value(); });
 }
 
-Eigen::Vector3d look_at_point(const std::vector<PosedView>& views) {
-  Eigen::Vector3d point = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  std::vector<double> weight(views.size(), 1.0);
-  for (int pass = 0; pass < 10; ++pass) {
-    NearestToLines axes;
-    for (std::size_t i = 0; i < views.size(); ++i)
-      axes.add(camera_center(views[i].cam_from_world),
-               axis_in_world(views[i], Eigen::Vector3d::UnitZ()), weight[i]);
-    if (!(axes.crossing() > 1e-6)) return point;
-    point = axes.point();
-    std::vector<double> distance(views.size());
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const Eigen::Vector3d d = axis_in_world(views[i], Eigen::Vector3d::UnitZ());
-      const Eigen::Vector3d v = point - camera_center(views[i].cam_from_world);
-      distance[i] = (v - d * d.dot(v)).norm();
-    }
-    const double scale = std::max(median(distance), 1e-12);
-    for (std::size_t i = 0; i < views.size(); ++i)
-      weight[i] = 1.0 / std::max(1.0, distance[i] / scale);  // Huber
-  }
-  return point;
-}
-
-Eigen::Vector3d up_direction(const std::vector<PosedView>& views) {
-  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d mean_up = Eigen::Vector3d::Zero();
-  for (const PosedView& view : views) {
-    const Eigen::Vector3d right = axis_in_world(view, Eigen::Vector3d::UnitX());
-    spread += right * right.transpose() / static_cast<double>(views.size());
-    mean_up -= axis_in_world(view, Eigen::Vector3d::UnitY());
-  }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
-  if (solver.eigenvalues()(1) < 0.02) return mean_up.normalized();
-  const Eigen::Vector3d up = solver.eigenvectors().col(0);
-  return up.dot(mean_up) < 0 ? Eigen::Vector3d(-up) : up;
-}
-
 OrbitAngles orbit_angles(const Eigen::Vector3d& center) {
   return {std::atan2(center.y(), center.x()) * degrees_per_radian,
           std::atan2(center.z(), center.head<2>().norm()) * degrees_per_radian, center.norm()};
@@ -86,7 +44,8 @@ OrbitAngles orbit_angles(const Eigen::Vector3d& center) {
 Similarity3d canonical_from_world(const std::vector<PosedView>& views,
                                   const std::vector<const FrameRecord*>& frames) {
   if (views.size() < 2) return {};
-  Eigen::Vector3d origin = look_at_point(views);
+  const std::vector<Rigid3d> cameras = cameras_of(views);
+  Eigen::Vector3d origin = look_at_point(cameras);
   std::vector<double> distances;
   Eigen::Vector3d mean_center = Eigen::Vector3d::Zero();
   for (const PosedView& view : views)
@@ -98,7 +57,7 @@ Similarity3d canonical_from_world(const std::vector<PosedView>& views,
   if (!(scale > 0)) return {};
 
   const Eigen::Quaterniond z_up =
-      Eigen::Quaterniond::FromTwoVectors(up_direction(views), Eigen::Vector3d::UnitZ());
+      Eigen::Quaterniond::FromTwoVectors(up_direction(cameras), Eigen::Vector3d::UnitZ());
   std::vector<double> offsets;  // azimuth in z_up minus the station's
   std::map<std::string, const FrameRecord*> by_name;
   for (const FrameRecord* frame : frames) by_name[frame->file] = frame;

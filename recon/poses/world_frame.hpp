@@ -16,13 +16,6 @@
 // and cameras mean something in it: z up, the origin where the cameras look, median distance 1.
 namespace orbitfuse {
 
-/// Point nearest to all optical axes (robust least squares). NaN when the axes are parallel.
-Eigen::Vector3d look_at_point(const std::vector<PosedView>& views);
-
-/// Unit vector most orthogonal to all camera x axes, on the side of the cameras' up: handheld and
-/// tripod cameras are level on average. Falls back to the mean up when the x axes are parallel.
-Eigen::Vector3d up_direction(const std::vector<PosedView>& views);
-
 /// Every frame has a station.
 bool all_have_stations(const std::vector<const FrameRecord*>& frames);
 

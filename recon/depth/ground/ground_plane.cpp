@@ -10,6 +10,8 @@
 #include <numbers>
 #include <optional>
 
+#include "core/geometry/level_cameras.hpp"
+
 namespace orbitfuse::depth {
 namespace {
 
@@ -44,7 +46,12 @@ std::vector<Eigen::Vector3d> confirmed_points(const std::vector<DepthView>& view
   return points;
 }
 
-std::optional<Eigen::Vector3d> mean_up(const std::vector<DepthView>& views) {
+std::optional<Eigen::Vector3d> common_up(const std::vector<DepthView>& views) {
+  std::vector<Rigid3d> cameras;
+  for (const DepthView& view : views)
+    cameras.push_back({Eigen::Quaterniond(view.world_rotation.cast<double>().eval()),
+                       view.translation.cast<double>()});
+  if (held_on_side(cameras)) return up_direction(cameras);
   Eigen::Vector3f up = Eigen::Vector3f::Zero();
   for (const DepthView& view : views) up -= view.world_rotation.row(1).transpose();
   if (!(up.norm() > min_common_up * static_cast<float>(views.size()))) return std::nullopt;
@@ -86,7 +93,7 @@ Result<LevelPlane> find_ground(const std::vector<DepthView>& views,
   const std::vector<Eigen::Vector3d> points = confirmed_points(views, maps);
   if (points.size() < least_depths)
     return no_ground(fmt::format("{} confirmed depths", points.size()));
-  const auto up = mean_up(views);
+  const auto up = common_up(views);
   if (!up) return no_ground("the views disagree about what is up");
   const auto plane = largest_level_plane(
       points, *up,

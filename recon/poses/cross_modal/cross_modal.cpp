@@ -9,11 +9,9 @@
 
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
-#include "recon/alignment/edge_field.hpp"
-#include "recon/poses/cross_modal/edge_lines.hpp"
 #include "recon/poses/cross_modal/mirrored_views.hpp"
+#include "recon/poses/cross_modal/orbit_choice.hpp"
 #include "recon/poses/cross_modal/orbit_frames.hpp"
-#include "recon/poses/cross_modal/orbit_selection.hpp"
 #include "recon/poses/cross_modal/tracking_views.hpp"
 #include "recon/poses/cross_modal/view_recovery.hpp"
 #include "recon/poses/cross_modal/view_verdicts.hpp"
@@ -31,38 +29,16 @@ constexpr double min_sure_ratio = 0.5;
 /// Lead of the best start over a rival, in standard errors: below the first nobody knows which is
 /// right, below the second nobody is sure.
 constexpr double undecided_lead = 1, sure_lead = 2;
-/// Below, the search leaves more to renders.
-constexpr std::size_t few_views = 16;
-
-/// Thermal stations and what they are looked for in.
-struct OrbitWork {
-  LensGuess lens;
-  LineModel lines;
-  std::vector<const FrameRecord*> frames;
-  std::vector<cv::Mat> images;
-};
-
-/// Lines that enough views confirm: as many witnesses as still leave a few hundred lines.
-std::vector<EdgeLine> confirmed(const std::vector<EdgeLine>& lines) {
-  for (const std::size_t views : {5u, 4u, 3u}) {
-    std::vector<EdgeLine> kept;
-    for (const EdgeLine& line : lines)
-      if (line.views.size() >= views) kept.push_back(line);
-    if (kept.size() >= 250 || views == 3) return kept;
-  }
-  return lines;
-}
-
 /// Frames recorded between the stations, posed among them; appended to `rendered`.
-Status pose_tracking(const Session& session, const OrbitWork& work, const Camera& lens,
+Status pose_tracking(const Session& session, const OrbitEvidence& evidence, const Camera& lens,
                      const std::vector<const FrameRecord*>& tracking, const SceneRenderer& renderer,
                      OrbitViews& orbit, RenderAlignment& rendered, const Progress& progress) {
   std::vector<PassedStation> passed;
-  for (std::size_t i = 0; i < work.frames.size(); ++i) {
+  for (std::size_t i = 0; i < evidence.frames.size(); ++i) {
     const ViewVerdict& verdict = rendered.views[i].verdict;
     if (verdict.confidence == Confidence::dropped || verdict.on_probation) continue;
     const Rigid3d cam = rebase(rendered.views[i].view.cam_from_world, orbit.canonical_from_world);
-    passed.push_back({work.frames[i]->sequence, orbit.stations[i],
+    passed.push_back({evidence.frames[i]->sequence, orbit.stations[i],
                       orbit_angles(camera_center(cam)).azimuth_deg});
   }
   std::vector<std::uint64_t> sequences;
@@ -72,77 +48,14 @@ Status pose_tracking(const Session& session, const OrbitWork& work, const Camera
     orbit.stations.push_back(station);
   const std::size_t first = rendered.views.size();
   for (const FrameRecord* frame : tracking) {
-    ORBITFUSE_ASSIGN(cv::Mat image, straight_luminance(session, *frame, lens));
-    orbit.images.push_back(std::move(image));
+    ORBITFUSE_ASSIGN(const cv::Mat image, straight_luminance(session, *frame, lens));
+    orbit.images.push_back(upright(evidence.turn, image));
     RenderAlignedView view;
     view.view = rendered.views.front().view;
     view.view.name = frame->file;
     rendered.views.push_back(view);
   }
   return add_views(renderer, orbit, first, rendered, progress);
-}
-
-/// All that placing the stations needs, read once.
-struct Evidence {
-  OrbitWork work;
-  std::vector<SearchView> search;
-  Similarity3d canonical_from_visible;
-  double similar_distance = 1;  ///< from where the thermal image shows as much as the visible one
-};
-
-Result<Evidence> gather(const Session& session, const Reconstruction& visible,
-                        const std::vector<const FrameRecord*>& stations, const Progress& progress) {
-  const TraceSpan span("edge lines of the visible scene");
-  const Similarity3d canonical_from_visible = canonical_from_world(visible.views, {});
-  Reconstruction canonical = visible;
-  move_world(canonical, canonical_from_visible);
-  ORBITFUSE_ASSIGN(const std::vector<EdgeLine> all_lines,
-                   visible_edge_lines(session, canonical, {}, progress));
-  const std::vector<EdgeLine> lines = confirmed(all_lines);
-  if (lines.size() < 30)
-    return fail(
-        ErrorKind::quality, "poses.thermal",
-        fmt::format("{} edges of the visible scene are confirmed by three views", lines.size()),
-        "more visible views, or a scene with edges that both cameras see");
-  std::vector<Eigen::Vector3d> centers;
-  for (const PosedView& view : canonical.views)
-    centers.push_back(camera_center(view.cam_from_world));
-  Evidence evidence{{lens_of(session, *stations.front()), LineModel(lines, centers), stations, {}},
-                    {},
-                    canonical_from_visible,
-                    1};
-  const Camera lens = evidence.work.lens.camera.without_distortion();
-  for (const FrameRecord* frame : stations) {
-    ORBITFUSE_ASSIGN(cv::Mat values,
-                     straight_luminance(session, *frame, evidence.work.lens.camera));
-    evidence.search.push_back({orientation_field(values, 2.0 * frame->width / 640.0), lens});
-    evidence.work.images.push_back(std::move(values));
-  }
-  const Camera& seen = canonical.views.front().camera;
-  evidence.similar_distance = lens.fx / lens.width * seen.width / seen.fx;
-  return evidence;
-}
-
-Result<std::vector<OrbitHypothesis>> search(const Evidence& evidence, const Progress& progress) {
-  const TraceSpan span("orbit search");
-  OrbitSearchOptions options;
-  options.nearest = 0.4 * evidence.similar_distance;
-  options.farthest = 1.8 * evidence.similar_distance;
-  // Renders decide; a rival that isn't opened can't be told from the best. Few views have few
-  // votes: of half an orbit of `statue` the true start came sixth.
-  const bool few = evidence.search.size() < few_views;
-  options.hypotheses = few ? 10 : 4;
-  ORBITFUSE_ASSIGN(const OrbitTable table,
-                   tabulate_orbit(evidence.work.lines, evidence.search, options, progress));
-  std::vector<OrbitHypothesis> found;
-  for (const std::vector<Station>& layout : layouts_of(evidence.work.frames))
-    for (OrbitHypothesis& hypothesis : search_orbit(table, layout, options))
-      found.push_back(std::move(hypothesis));
-  std::stable_sort(found.begin(), found.end(),
-                   [](const auto& x, const auto& y) { return x.score > y.score; });
-  const std::size_t most = few ? 12 : 6;
-  if (found.size() > most) found.resize(most);
-  return found;
 }
 
 std::string words(const SelectedOrbit& selected) {
@@ -174,52 +87,71 @@ void doubt_all(double lead, RenderAlignment& rendered) {
 }
 
 /// Refused as what they are: poses of mirrored views pass every other check.
-Status check_mirrored(const SceneRenderer& renderer, const ChosenOrbit& chosen,
+Status check_mirrored(const SceneRenderer& renderer, const OrbitChoice& choice,
                       const Progress& progress, PlacedViews& placed) {
+  const ChosenOrbit chosen{choice.evidence.lines,
+                           choice.evidence.search,
+                           choice.orbit,
+                           choice.blank,
+                           choice.hypotheses[choice.selected.hypothesis],
+                           choice.selected};
   ORBITFUSE_ASSIGN(const std::optional<MirroredSupport> mirrored,
                    support_if_mirrored(renderer, chosen, progress));
   if (!mirrored) return {};
   placed.gates["mirrored_lead_standard_errors"] = mirrored->lead_standard_errors;
   if (!mirrored->told()) return {};
+  // Upside down and mirrored left to right is mirrored top to bottom.
+  constexpr const char* ways[] = {"left to right", "about a diagonal", "top to bottom",
+                                  "about a diagonal"};
   return fail(ErrorKind::input, "thermal images",
-              fmt::format("mirrored left to right against the photos: so turned round they fit the "
+              fmt::format("mirrored {} against the photos: so turned round they fit the "
                           "visible scene {:.2f} times as well ({:.1f} standard errors)",
-                          mirrored->ratio, mirrored->lead_standard_errors),
+                          ways[choice.evidence.turn.clockwise], mirrored->ratio,
+                          mirrored->lead_standard_errors),
               "mirror the files back (or the photos, if those are), turn off the camera's setting, "
               "and import again; poses.check_mirrored = false (--set) takes them as they are");
 }
 
-/// Places the views against renders: the hypothesis and the starts, then each view to the end, then
-/// the frames recorded between the stations, then the verdicts.
-Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene& visible,
-                                     const Evidence& evidence,
-                                     const std::vector<OrbitHypothesis>& hypotheses,
+/// The images are as their camera was held and their lens has distorted them.
+PlacedView as_taken(QuarterTurn turn, const Camera& lens, const RenderAlignedView& view) {
+  PosedView taken = as_taken(turn, view.view);
+  const double fx = taken.camera.fx, fy = taken.camera.fy;
+  taken.camera = lens;
+  taken.camera.fx = fx, taken.camera.fy = fy;
+  return {taken, view.verdict, view.agreement, view.median_px};
+}
+
+/// How the camera was held, and what came of its lens.
+void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
+  if (turn.clockwise != 0) {
+    placed.why += fmt::format("; the camera was held {}",
+                              turn.clockwise == 2 ? "upside down" : "on its side");
+    placed.gates["images_turned_deg"] = turn.degrees();
+  }
+  placed.gates["focal_px"] = lens.camera.fx;
+  placed.gates["lens_k1"] = lens.camera.k1;
+  if (lens.guessed)
+    placed.warnings.push_back(
+        fmt::format("the thermal lens is unknown: 33 degrees were assumed to begin with, and "
+                    "{:.1f} found ({:.0f} px); give its focal length (import --thermal-focal-px) "
+                    "if you know it better",
+                    lens.camera.horizontal_fov_deg(), lens.camera.fx));
+}
+
+/// Aligns the views of a chosen start with renders, then the frames recorded between the stations,
+/// then judges them all.
+Result<PlacedViews> place_by_renders(const Session& session, const SceneRenderer& renderer,
+                                     OrbitChoice choice,
                                      const std::vector<const FrameRecord*>& tracking,
                                      const PoseOptions& options, const Progress& progress) {
-  progress.report({"poses.thermal", 2, 4, {}, "views of the scene"});
-  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
-                   scene_of(visible, evidence.canonical_from_visible, progress));
-  OrbitViews orbit;
-  orbit.images = evidence.work.images;
-  orbit.canonical_from_world = evidence.canonical_from_visible;
-  orbit.assumed = !all_have_stations(evidence.work.frames);
-  std::vector<PosedView> blank;
-  for (const FrameRecord* frame : evidence.work.frames)
-    blank.push_back({frame->file, evidence.work.lens.camera.without_distortion(), {}});
-  ORBITFUSE_ASSIGN(SelectedOrbit selected,
-                   select_by_renders(renderer, orbit, blank, hypotheses, progress));
+  const OrbitEvidence& evidence = choice.evidence;
+  OrbitViews& orbit = choice.orbit;
   PlacedViews placed;
   placed.method = "cross-modal, orbit prior and renders";
-  placed.why = words(selected);
-  RenderAlignment& rendered = selected.alignment;
-  const double lead =
-      selected.lead_standard_errors.value_or(std::numeric_limits<double>::infinity());
+  placed.why = words(choice.selected);
+  const double lead = choice.lead();
   if (std::isfinite(lead)) placed.gates["start_lead_standard_errors"] = lead;
-  if (options.check_mirrored)
-    ORBITFUSE_TRY(check_mirrored(renderer,
-                                 {evidence.work.lines, evidence.search, orbit, blank,
-                                  hypotheses[selected.hypothesis], selected},
-                                 progress, placed));
+  if (options.check_mirrored) ORBITFUSE_TRY(check_mirrored(renderer, choice, progress, placed));
   if (!(lead >= undecided_lead))
     return fail(ErrorKind::quality, "poses.thermal",
                 fmt::format("two starts of the orbit explain the thermal views about equally well "
@@ -228,53 +160,47 @@ Result<PlacedViews> place_by_renders(const Session& session, const VisibleScene&
                 "record more thermal stations, or give known poses: the object looks alike from "
                 "both sides");
   progress.report({"poses.thermal", 3, 4, {}, "alignment with renders"});
-  LensGuess lens = evidence.work.lens;
+  RenderAlignment& rendered = choice.selected.alignment;
+  LensGuess lens = evidence.lens;
   ORBITFUSE_TRY(refine_orbit(renderer, orbit, rendered,
                              {lens.focal_relative_sigma, lens.radial_sigma}, progress));
   // k1 belongs to the focal length that it was found with.
-  lens.camera.fx = rendered.views.front().view.camera.fx;
-  lens.camera.fy = rendered.views.front().view.camera.fy;
+  const Camera refined = as_taken(evidence.turn, rendered.views.front().view).camera;
+  lens.camera.fx = refined.fx;
+  lens.camera.fy = refined.fy;
   lens.camera.k1 += rendered.radial;
-  if (lens.guessed)
-    placed.warnings.push_back(
-        fmt::format("the thermal lens is unknown: 33 degrees were assumed to begin with, and "
-                    "{:.1f} found ({:.0f} px); give its focal length (import --thermal-focal-px) "
-                    "if you know it better",
-                    lens.camera.horizontal_fov_deg(), lens.camera.fx));
   if (!tracking.empty())
-    ORBITFUSE_TRY(pose_tracking(session, evidence.work, lens.camera, tracking, renderer, orbit,
-                                rendered, progress));
+    ORBITFUSE_TRY(pose_tracking(session, evidence, lens.camera, tracking, renderer, orbit, rendered,
+                                progress));
   ORBITFUSE_ASSIGN(const std::vector<int> doubted,
-                   judge_views({renderer, orbit, progress}, blank.size(), rendered));
+                   judge_views({renderer, orbit, progress}, choice.blank.size(), rendered));
   if (lead < sure_lead) doubt_all(lead, rendered);
+  tell_camera(lens, evidence.turn, placed);
   if (!doubted.empty()) placed.warnings.push_back(loops_in_doubt(doubted));
-  for (const RenderAlignedView& view : rendered.views) {
-    placed.views.push_back({view.view, view.verdict, view.agreement, view.median_px});
-    // The images are as their lens has distorted them.
-    Camera& camera = placed.views.back().view.camera;
-    const double fx = camera.fx, fy = camera.fy;
-    camera = lens.camera;
-    camera.fx = fx, camera.fy = fy;
-  }
-  placed.gates["focal_px"] = rendered.focal_px;
-  placed.gates["lens_k1"] = lens.camera.k1;
+  for (const RenderAlignedView& view : rendered.views)
+    placed.views.push_back(as_taken(evidence.turn, lens.camera, view));
   placed.gates["loops_in_doubt"] = static_cast<double>(doubted.size());
   return placed;
 }
 
+/// Views that are kept, of the first `count`.
+int kept(const PlacedViews& placed, std::size_t count) {
+  return static_cast<int>(std::count_if(
+      placed.views.begin(), placed.views.begin() + static_cast<std::ptrdiff_t>(count),
+      [](const PlacedView& view) { return view.verdict.confidence != Confidence::dropped; }));
+}
+
 /// The answer as a whole: enough stations, and most of them sure. Frames between them come and go.
-Status believed(const PlacedViews& placed, std::size_t stations, const LadderStep& step,
+Status believed(const PlacedViews& placed, std::size_t stations, std::size_t wanted,
                 const PoseOptions& options) {
-  double posed = 0, sure = 0;
-  for (std::size_t i = 0; i < stations; ++i) {
-    posed += placed.views[i].verdict.confidence != Confidence::dropped ? 1 : 0;
-    sure += placed.views[i].verdict.sure() ? 1 : 0;
-  }
+  const double posed = kept(placed, stations);
+  double sure = 0;
+  for (std::size_t i = 0; i < stations; ++i) sure += placed.views[i].verdict.sure() ? 1 : 0;
   const auto all = static_cast<double>(stations);
   if (posed >= options.min_posed_ratio * all && sure >= min_sure_ratio * all) return {};
   std::string found =
-      fmt::format("{} of {} thermal views are placed, {:.0f} of {} stations for sure", step.posed,
-                  step.total, sure, stations);
+      fmt::format("{} of {} thermal views are placed, {:.0f} of {} stations for sure",
+                  kept(placed, placed.views.size()), wanted, sure, stations);
   for (const std::string& warning : placed.warnings) found += "; " + warning;
   std::map<std::string, int> reasons;
   for (const PlacedView& view : placed.views)
@@ -283,6 +209,36 @@ Status believed(const PlacedViews& placed, std::size_t stations, const LadderSte
   return fail(ErrorKind::quality, "poses.thermal", found,
               "say how the views were taken (import --station-spacing-deg, --loops, "
               "--thermal-focal-px), record more stations, or give known poses");
+}
+
+/// What a choice of the orbit's start comes to.
+struct Answer {
+  Result<PlacedViews> placed;
+  Status good;  ///< of what is placed
+
+  const Error* error() const { return !placed ? &placed.error() : !good ? &good.error() : nullptr; }
+  bool is_poor() const { return error() != nullptr && error()->kind == ErrorKind::quality; }
+};
+
+/// As the images are; where that comes to nothing, with the camera held otherwise.
+Answer answer_of(const Session& session, const SceneRenderer& renderer,
+                 const OrbitEvidence& evidence, const OrbitFrames& orbit, std::size_t wanted,
+                 const PoseOptions& options, const Progress& progress) {
+  const auto of = [&](const Result<OrbitChoice>& choice) -> Answer {
+    if (!choice) return {tl::unexpected(choice.error()), {}};
+    Answer answer{place_by_renders(session, renderer, *choice, orbit.tracking, options, progress),
+                  {}};
+    if (answer.placed)
+      answer.good = believed(*answer.placed, orbit.stations.size(), wanted, options);
+    return answer;
+  };
+  const Result<OrbitChoice> as_is = choose_orbit(renderer, evidence, progress);
+  Answer answer = of(as_is);
+  if (!answer.is_poor()) return answer;
+  const Result<OrbitChoice> turned = choose_turned_orbit(renderer, evidence, progress);
+  if (turned && as_is && !turned->clearly_better_than(*as_is)) return answer;
+  Answer other = of(turned);
+  return other.is_poor() ? answer : other;
 }
 
 }  // namespace
@@ -326,14 +282,16 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   const std::vector<const FrameRecord*>& stations = orbit.stations;
   const std::size_t wanted = stations.size() + orbit.tracking.size() + orbit.left_out.size();
   tell(0, "lines of the visible scene");
-  ORBITFUSE_ASSIGN(const Evidence evidence,
-                   gather(session, visible.reconstruction, stations, progress));
-  tell(1, "search of the orbit");
-  ORBITFUSE_ASSIGN(const std::vector<OrbitHypothesis> hypotheses, search(evidence, progress));
-  const Result<PlacedViews> placed =
-      place_by_renders(session, visible, evidence, hypotheses, orbit.tracking, options, progress);
+  ORBITFUSE_ASSIGN(const OrbitEvidence evidence,
+                   gather_evidence(session, visible.reconstruction, stations, progress));
+  tell(1, "views of the scene");
+  ORBITFUSE_ASSIGN(const SceneRenderer renderer,
+                   scene_of(visible, evidence.canonical_from_visible, progress));
+  tell(2, "search of the orbit");
+  const Answer answer = answer_of(session, renderer, evidence, orbit, wanted, options, progress);
+  const Result<PlacedViews>& placed = answer.placed;
   LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(wanted), 0};
-  step.why = fmt::format("{} lines", evidence.work.lines.size());
+  step.why = fmt::format("{} lines", evidence.lines.size());
   const auto finish = [&] {
     step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     steps.push_back(step);
@@ -353,7 +311,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   for (const auto& [name, why] : orbit.left_out) result.dropped.push_back({name, why});
   take_verdicts(*placed, result);
   step.posed = static_cast<int>(result.reconstruction.views.size());
-  const Status good = believed(*placed, stations.size(), step, options);
+  const Status& good = answer.good;
   step.held = good.has_value();
   if (!good) step.why += "; " + good.error().found;
   finish();

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "core/geometry/level_cameras.hpp"
+#include "core/numeric/angle_units.hpp"
 #include "tests/support/orbit_fixture.hpp"
 
 namespace orbitfuse {
@@ -18,13 +20,32 @@ TEST(WorldFrame, CanonicalIsZUpCentredAndOfUnitRadius) {
   Reconstruction model;
   model.views = testing_orbit::two_loops();
   move_world(model, some_world());
-  EXPECT_LT((look_at_point(model.views) - some_world() * Eigen::Vector3d::Zero()).norm(), 1e-3);
+  EXPECT_LT(
+      (look_at_point(cameras_of(model.views)) - some_world() * Eigen::Vector3d::Zero()).norm(),
+      1e-3);
   const Similarity3d canonical = canonical_from_world(model.views, {});
   move_world(model, canonical);
   for (const PosedView& view : model.views) {
     const OrbitAngles angles = orbit_angles(camera_center(view.cam_from_world));
     EXPECT_NEAR(angles.radius, 1.0, 1e-3);
     EXPECT_NEAR(angles.elevation_deg, &view - model.views.data() < 12 ? 14 : 34, 0.2);
+  }
+}
+
+TEST(WorldFrame, CamerasHeldOnTheirSideStandUprightInTheSameWorld) {
+  for (const double turn_deg : {90.0, -90.0}) {
+    Reconstruction model;
+    model.views = testing_orbit::two_loops();
+    const Eigen::AngleAxisd roll(turn_deg / degrees_per_radian, Eigen::Vector3d::UnitZ());
+    for (PosedView& view : model.views)
+      view.cam_from_world =
+          Rigid3d{Eigen::Quaterniond(roll), Eigen::Vector3d::Zero()} * view.cam_from_world;
+    move_world(model, some_world());
+    move_world(model, canonical_from_world(model.views, {}));
+    for (const PosedView& view : model.views)
+      EXPECT_NEAR(orbit_angles(camera_center(view.cam_from_world)).elevation_deg,
+                  &view - model.views.data() < 12 ? 14 : 34, 0.2)
+          << turn_deg;
   }
 }
 
