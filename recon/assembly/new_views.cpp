@@ -36,19 +36,18 @@ Rigid3d look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target,
   return {q, -(q * eye)};
 }
 
-Camera render_camera(const std::vector<PosedView>& posed, int width_px) {
-  return at_width(posed[posed.size() / 2].camera.without_distortion(), width_px);
+Camera middle_camera(const std::vector<PosedView>& posed) {
+  return posed[posed.size() / 2].camera.without_distortion();
 }
 
-/// New views of an orbit are upright, however the cameras were held.
-Camera upright_camera(const std::vector<PosedView>& posed, int width_px) {
-  Camera camera = posed[posed.size() / 2].camera.without_distortion();
-  if (held_on_side(cameras_of(posed))) {
-    std::swap(camera.width, camera.height);
-    std::swap(camera.fx, camera.fy);
-    std::swap(camera.cx, camera.cy);
-  }
-  return at_width(camera, width_px);
+/// As if the cameras had not been held on their side.
+Camera upright_camera(const std::vector<PosedView>& posed) {
+  Camera camera = middle_camera(posed);
+  if (!held_on_side(cameras_of(posed))) return camera;
+  std::swap(camera.width, camera.height);
+  std::swap(camera.fx, camera.fy);
+  std::swap(camera.cx, camera.cy);
+  return camera;
 }
 
 NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& orbit,
@@ -56,13 +55,14 @@ NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& o
   const double elevation = options.elevation_deg.value_or(orbit.elevation_deg) * radians_per_degree;
   const double radius = orbit.radius * options.radius_scale;
   const Eigen::Vector3d side = orbit.up.cross(orbit.first);
+  const Camera camera = at_width(upright_camera(posed), options.width_px);
   NewViews result;
   for (int i = 0; i < options.views; ++i) {
     const double azimuth = (options.azimuth_deg + 360.0 * i / options.views) * radians_per_degree;
     const Eigen::Vector3d out =
         std::cos(elevation) * (std::cos(azimuth) * orbit.first + std::sin(azimuth) * side) +
         std::sin(elevation) * orbit.up;
-    result.views.push_back({fmt::format("{:03}", i), upright_camera(posed, options.width_px),
+    result.views.push_back({fmt::format("{:03}", i), camera,
                             look_at(orbit.center + radius * out, orbit.center, orbit.up)});
   }
   result.described = fmt::format("orbit of {} views, elevation {:.0f}°", options.views,
@@ -72,6 +72,7 @@ NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& o
 
 NewViews along_path(const std::vector<PosedView>& posed, const NewViewOptions& options) {
   NewViews result;
+  const Camera camera = at_width(middle_camera(posed), options.width_px);
   const double last = static_cast<double>(posed.size() - 1);
   for (int i = 0; i < options.views; ++i) {
     const double t = last * (i + 0.5) / options.views;
@@ -80,8 +81,7 @@ NewViews along_path(const std::vector<PosedView>& posed, const NewViewOptions& o
     const Rigid3d &a = posed[k].cam_from_world, &b = posed[k + 1].cam_from_world;
     const Eigen::Quaterniond q = a.rotation.slerp(share, b.rotation);
     const Eigen::Vector3d eye = (1 - share) * camera_center(a) + share * camera_center(b);
-    result.views.push_back(
-        {fmt::format("{:03}", i), render_camera(posed, options.width_px), {q, -(q * eye)}});
+    result.views.push_back({fmt::format("{:03}", i), camera, {q, -(q * eye)}});
   }
   result.described = fmt::format("{} views between the recorded cameras", options.views);
   return result;

@@ -62,6 +62,30 @@ TEST(NewViews, OrbitViewsLookAtTheCentreFromBetweenTheStations) {
   EXPECT_NEAR(std::atan2(out.y(), out.x()) / deg, 15, 1e-6);
 }
 
+TEST(NewViews, OfCamerasHeldOnTheirSideAreUpright) {
+  std::vector<PosedView> posed = orbit(0, 360);
+  const Rigid3d roll{Eigen::Quaterniond(Eigen::AngleAxisd(90 * deg, Eigen::Vector3d::UnitZ())),
+                     Eigen::Vector3d::Zero()};
+  for (PosedView& view : posed) {
+    view.cam_from_world = roll * view.cam_from_world;
+    view.camera = Camera::from_fov(600, 800, 45);
+  }
+  const auto geometry = orbit_geometry(posed);
+  ASSERT_TRUE(geometry);
+  EXPECT_NEAR(geometry->up.z(), 1, 1e-9);
+  EXPECT_NEAR(geometry->elevation_deg, 20, 1e-9);
+  const auto made = new_views(posed, {});
+  ASSERT_TRUE(made);
+  EXPECT_THAT(made->described, testing::HasSubstr("orbit"));
+  const Camera camera = made->views[0].camera;
+  EXPECT_EQ(camera.width, 640);
+  EXPECT_EQ(camera.height, 480);
+  for (const PosedView& v : made->views) {
+    EXPECT_LT((camera.project(v.cam_from_world * target) - Eigen::Vector2d(320, 240)).norm(), 1e-6);
+    EXPECT_LT(camera.project(v.cam_from_world * (target + Eigen::Vector3d(0, 0, 0.1))).y(), 240);
+  }
+}
+
 TEST(NewViews, TheElevationIsTheCamerasMedianUnlessOneIsGiven) {
   const auto elevation = [](const NewViewOptions& options) {
     const auto made = new_views(orbit(0, 360), options);
