@@ -29,6 +29,8 @@ constexpr int max_tracking_frames = 96;
 constexpr double min_sure_ratio = 0.5;
 /// Support of upright views, on average: 17 to 52 on seven scenes, 1 to 11 of turned ones.
 constexpr double usual_support = 12;
+/// Cameras that stand lower than this look up at the object, or their images are upside down.
+constexpr double below_deg = -5;
 /// Lead of the best start over a rival, in standard errors: below the first nobody knows which is
 /// right, below the second nobody is sure.
 constexpr double undecided_lead = 1, sure_lead = 2;
@@ -249,6 +251,18 @@ Answer answer_of(const Session& session, const SceneRenderer& renderer,
   return answer ? *answer : of(as_is);
 }
 
+/// What may be wrong with the photos where thermal views find no place among them.
+std::string doubt_of_photos(const Reconstruction& visible) {
+  const Similarity3d canonical = canonical_from_world(visible.views, {});
+  std::vector<double> elevations_deg;
+  for (const PosedView& view : visible.views)
+    elevations_deg.push_back(
+        orbit_angles(canonical * camera_center(view.cam_from_world)).elevation_deg);
+  if (elevations_deg.empty() || median(elevations_deg) > below_deg) return {};
+  return fmt::format("; the photos look up at the object, by {:.0f} deg: are they upside down?",
+                     -median(elevations_deg));
+}
+
 }  // namespace
 
 void take_verdicts(const PlacedViews& placed, ModalityPoses& poses) {
@@ -301,6 +315,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(wanted), 0};
   step.why = fmt::format("{} lines", evidence.lines.size());
   const auto finish = [&] {
+    if (!step.held) step.why += doubt_of_photos(visible.reconstruction);
     step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     steps.push_back(step);
   };
