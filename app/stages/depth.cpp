@@ -86,7 +86,7 @@ Result<StageOutput> estimate(const StageContext& context, const SessionInput& in
 pipeline::Stage depth_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "depth";
-  stage.version = 4;  // sure pixels ask the sources that show them first
+  stage.version = 5;  // ground under cameras on their side
   stage.needs = {"poses_visible"};
   stage.options = in.config->settings().to_json("depth");
   stage.options["holdout_every"] = in.config->train_visible.options.holdout_every;

@@ -20,6 +20,7 @@
 
 #include "bench/poses/misalignment.hpp"
 #include "core/formats/colmap_model.hpp"
+#include "core/geometry/quarter_turn.hpp"
 #include "core/image/image_io.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/clock.hpp"
@@ -27,7 +28,6 @@
 #include "core/system/parallel.hpp"
 #include "recon/assembly/field_renderer.hpp"
 #include "recon/nerf/nerf.hpp"
-#include "recon/poses/cross_modal/quarter_turn.hpp"
 #include "recon/poses/estimate_poses.hpp"
 #include "tests/support/orbit_scenes.hpp"
 #include "tests/support/temp_folder.hpp"

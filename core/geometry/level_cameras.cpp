@@ -38,9 +38,11 @@ struct AxesSpread {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
 };
 
-/// Upright cameras' y axes are never twice as round as their x axes.
+/// Of upright cameras the y axes fan out with the elevation: by .21 from the ground to the zenith.
+/// More, and twice as much as the x axes, is a walk of 125 degrees and more on the side; a shorter
+/// one can't be told from a climb.
 bool on_side(const AxesSpread& right, const AxesSpread& down) {
-  return down.round() > 2 * right.round() && down.round() > least_round;
+  return down.round() > 2 * right.round() && down.round() > 0.3;
 }
 
 }  // namespace
@@ -85,7 +87,6 @@ Eigen::Vector3d up_direction(const std::vector<Rigid3d>& cameras) {
   Eigen::Vector3d mean_up = -down.sum;
   if (side) {  // to the left or to the right: cameras look down rather than up
     const Eigen::Vector3d origin = look_at_point(cameras);
-    if (!origin.allFinite()) return mean_up.normalized();
     mean_up.setZero();
     for (const Rigid3d& camera : cameras) mean_up += camera_center(camera) - origin;
   }

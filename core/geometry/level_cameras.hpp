@@ -13,8 +13,9 @@ std::vector<Rigid3d> cameras_of(const std::vector<PosedView>& views);
 /// Point nearest to all optical axes (robust least squares). NaN when the axes are parallel.
 Eigen::Vector3d look_at_point(const std::vector<Rigid3d>& cameras);
 
-/// Most of the cameras lay on one side (portrait) without their images being turned. Level axes of
-/// a walk round something point all round, those across them lean together.
+/// The cameras lay on their side (portrait) without their images being turned, on a walk of 125
+/// degrees and more, below 45 degrees of elevation: level axes of a walk round something point all
+/// round, those across them lean together.
 bool held_on_side(const std::vector<Rigid3d>& cameras);
 
 /// Unit vector most orthogonal to all camera x axes, on the side of the cameras' up: handheld and

@@ -11,6 +11,7 @@
 #include "core/geometry/level_cameras.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "core/geometry/nearest_to_lines.hpp"
+#include "core/geometry/quarter_turn.hpp"
 #include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "core/option_range.hpp"
@@ -36,18 +37,12 @@ Rigid3d look_at(const Eigen::Vector3d& eye, const Eigen::Vector3d& target,
   return {q, -(q * eye)};
 }
 
-Camera middle_camera(const std::vector<PosedView>& posed) {
-  return posed[posed.size() / 2].camera.without_distortion();
-}
-
-/// As if the cameras had not been held on their side.
-Camera upright_camera(const std::vector<PosedView>& posed) {
-  Camera camera = middle_camera(posed);
-  if (!held_on_side(cameras_of(posed))) return camera;
-  std::swap(camera.width, camera.height);
-  std::swap(camera.fx, camera.fy);
-  std::swap(camera.cx, camera.cy);
-  return camera;
+/// As if it had not been held on its side.
+Camera upright_camera(const PosedView& view, const Eigen::Vector3d& up) {
+  const Eigen::Vector3d up_in_cam = view.cam_from_world.rotation * up;
+  const Camera camera = view.camera.without_distortion();
+  if (std::abs(up_in_cam.x()) < std::abs(up_in_cam.y())) return camera;
+  return upright(QuarterTurn{up_in_cam.x() < 0 ? 1 : 3}, camera);
 }
 
 NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& orbit,
@@ -55,7 +50,8 @@ NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& o
   const double elevation = options.elevation_deg.value_or(orbit.elevation_deg) * radians_per_degree;
   const double radius = orbit.radius * options.radius_scale;
   const Eigen::Vector3d side = orbit.up.cross(orbit.first);
-  const Camera camera = at_width(upright_camera(posed), options.width_px);
+  const Camera camera =
+      at_width(upright_camera(posed[posed.size() / 2], orbit.up), options.width_px);
   NewViews result;
   for (int i = 0; i < options.views; ++i) {
     const double azimuth = (options.azimuth_deg + 360.0 * i / options.views) * radians_per_degree;
@@ -72,7 +68,8 @@ NewViews along_orbit(const std::vector<PosedView>& posed, const OrbitGeometry& o
 
 NewViews along_path(const std::vector<PosedView>& posed, const NewViewOptions& options) {
   NewViews result;
-  const Camera camera = at_width(middle_camera(posed), options.width_px);
+  const Camera camera =
+      at_width(posed[posed.size() / 2].camera.without_distortion(), options.width_px);
   const double last = static_cast<double>(posed.size() - 1);
   for (int i = 0; i < options.views; ++i) {
     const double t = last * (i + 0.5) / options.views;

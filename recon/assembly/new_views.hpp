@@ -19,7 +19,7 @@ enum class PathKind {
 struct NewViewOptions {
   PathKind path = PathKind::automatic;
   int views = 8;            ///< new cameras along the path
-  int width_px = 640;       ///< of a rendered image; its height follows the visible camera
+  int width_px = 640;       ///< of a rendered image; its height follows the visible camera, upright
   double azimuth_deg = 15;  ///< first view, from the first camera: between 30 degree stations
   std::optional<double> elevation_deg;  ///< of an orbit; none: the cameras' median
   double radius_scale = 1;              ///< of an orbit, times the cameras' median distance

@@ -3,11 +3,23 @@
 
 #include <fmt/format.h>
 
+#include "core/geometry/level_cameras.hpp"
 #include "recon/poses/estimate/visible_ladder.hpp"
 #include "recon/poses/known/photo_check.hpp"
 #include "recon/poses/known/session_poses.hpp"
 
 namespace orbitfuse {
+namespace {
+
+/// Which side the cameras lay on nothing says for sure.
+void tell_side(ModalityPoses& poses) {
+  if (!held_on_side(cameras_of(poses.reconstruction.views))) return;
+  poses.warnings.push_back(
+      "the photos lie on their side: up is taken to be where their cameras stand above what they "
+      "look at; if new views are upside down, turn the photos upright and import them again");
+}
+
+}  // namespace
 
 Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseOptions& options,
                                              const std::filesystem::path& workdir,
@@ -18,6 +30,7 @@ Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseO
     ORBITFUSE_ASSIGN(ModalityPoses known, known_poses(session, Modality::visible));
     if (options.check_known_poses)
       ORBITFUSE_TRY(check_by_photos(session, options, workdir / "visible", progress, known));
+    tell_side(known);
     return known;
   }
   const auto frames = session.frames_of(Modality::visible, options.use_tracking_frames);
@@ -29,6 +42,7 @@ Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseO
   ORBITFUSE_ASSIGN(ModalityPoses poses, pose_visible_views(session, frames, options,
                                                            workdir / "visible", progress, steps));
   poses.ladder = std::move(steps);
+  tell_side(poses);
   return poses;
 }
 

@@ -17,6 +17,7 @@ WITHOUT_PLOT = {
     "hostile.md": "says what the program answers",
     "input/known_poses.md": "mistakes that are seen or not",
     "input/mirrored.md": "refused or not",
+    "input/turned.md": "placed or not",
     "run_real.md": "what came of four recordings, without truth",
     "stability.md": "cases that hold or don't",
 }

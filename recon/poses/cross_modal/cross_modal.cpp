@@ -8,6 +8,7 @@
 #include <limits>
 #include <optional>
 
+#include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
 #include "recon/poses/cross_modal/mirrored_views.hpp"
@@ -73,6 +74,12 @@ std::string words(const SelectedOrbit& selected) {
   return text;
 }
 
+const char* held(QuarterTurn turn) { return turn.clockwise == 2 ? "upside down" : "on its side"; }
+
+std::string words(QuarterTurn turn) {
+  return turn.clockwise == 0 ? "" : fmt::format("; the camera was held {}", held(turn));
+}
+
 std::string loops_in_doubt(const std::vector<int>& loops) {
   std::string text;
   for (const int loop : loops)
@@ -91,28 +98,25 @@ void doubt_all(double lead, RenderAlignment& rendered) {
                                   lead)};
 }
 
+Result<std::optional<MirroredSupport>> mirrored_support(const SceneRenderer& renderer,
+                                                        const OrbitChoice& choice,
+                                                        const Progress& progress) {
+  return support_if_mirrored(
+      renderer,
+      {choice.evidence.lines, choice.evidence.search, choice.orbit, choice.blank,
+       choice.hypotheses[choice.selected.hypothesis], choice.selected},
+      progress);
+}
+
 /// Refused as what they are: poses of mirrored views pass every other check.
-Status check_mirrored(const SceneRenderer& renderer, const OrbitChoice& choice,
-                      const Progress& progress, PlacedViews& placed) {
-  const ChosenOrbit chosen{choice.evidence.lines,
-                           choice.evidence.search,
-                           choice.orbit,
-                           choice.blank,
-                           choice.hypotheses[choice.selected.hypothesis],
-                           choice.selected};
-  ORBITFUSE_ASSIGN(const std::optional<MirroredSupport> mirrored,
-                   support_if_mirrored(renderer, chosen, progress));
-  if (!mirrored) return {};
-  placed.gates["mirrored_lead_standard_errors"] = mirrored->lead_standard_errors;
-  if (!mirrored->told()) return {};
+tl::unexpected<Error> are_mirrored(const MirroredSupport& mirrored, QuarterTurn turn) {
   // Upside down and mirrored left to right is mirrored top to bottom.
   constexpr const char* ways[] = {"left to right", "about a diagonal", "top to bottom",
                                   "about a diagonal"};
   return fail(ErrorKind::input, "thermal images",
               fmt::format("mirrored {} against the photos: so turned round they fit the "
                           "visible scene {:.2f} times as well ({:.1f} standard errors)",
-                          ways[choice.evidence.turn.clockwise], mirrored->ratio,
-                          mirrored->lead_standard_errors),
+                          ways[turn.clockwise], mirrored.ratio, mirrored.lead_standard_errors),
               "mirror the files back (or the photos, if those are), turn off the camera's setting, "
               "and import again; poses.check_mirrored = false (--set) takes them as they are");
 }
@@ -126,11 +130,18 @@ PlacedView as_taken(QuarterTurn turn, const Camera& lens, const RenderAlignedVie
   return {taken, view.verdict, view.agreement, view.median_px};
 }
 
+double longer_side_deg(const Camera& camera) {
+  return 2 * std::atan(std::max(camera.width, camera.height) / (2 * camera.fx)) *
+         degrees_per_radian;
+}
+
 /// How the camera was held, and what came of its lens.
 void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
   if (turn.clockwise != 0) {
-    placed.why += fmt::format("; the camera was held {}",
-                              turn.clockwise == 2 ? "upside down" : "on its side");
+    placed.warnings.push_back(fmt::format(
+        "the thermal camera was held {} against the visible one: its images fit the scene turned "
+        "by {:.0f} deg, and are posed so",
+        held(turn), turn.degrees()));
     placed.gates["images_turned_deg"] = turn.degrees();
   }
   placed.gates["focal_px"] = lens.camera.fx;
@@ -140,7 +151,7 @@ void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
         fmt::format("the thermal lens is unknown: 33 degrees were assumed to begin with, and "
                     "{:.1f} found ({:.0f} px); give its focal length (import --thermal-focal-px) "
                     "if you know it better",
-                    lens.camera.horizontal_fov_deg(), lens.camera.fx));
+                    longer_side_deg(lens.camera), lens.camera.fx));
 }
 
 /// Aligns the views of a chosen start with renders, then the frames recorded between the stations,
@@ -148,15 +159,14 @@ void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
 Result<PlacedViews> place_by_renders(const Session& session, const SceneRenderer& renderer,
                                      OrbitChoice choice,
                                      const std::vector<const FrameRecord*>& tracking,
-                                     const PoseOptions& options, const Progress& progress) {
+                                     const Progress& progress) {
   const OrbitEvidence& evidence = choice.evidence;
   OrbitViews& orbit = choice.orbit;
   PlacedViews placed;
   placed.method = "cross-modal, orbit prior and renders";
-  placed.why = words(choice.selected);
+  placed.why = words(choice.selected) + words(evidence.turn);
   const double lead = choice.lead();
   if (std::isfinite(lead)) placed.gates["start_lead_standard_errors"] = lead;
-  if (options.check_mirrored) ORBITFUSE_TRY(check_mirrored(renderer, choice, progress, placed));
   if (!(lead >= undecided_lead))
     return fail(ErrorKind::quality, "poses.thermal",
                 fmt::format("two starts of the orbit explain the thermal views about equally well "
@@ -219,36 +229,61 @@ Status believed(const PlacedViews& placed, std::size_t stations, std::size_t wan
 /// What a choice of the orbit's start comes to.
 struct Answer {
   Result<PlacedViews> placed;
-  Status good;  ///< of what is placed
+  Status good = {};             ///< of what is placed
+  double mirrored_support = 0;  ///< where the images are taken for mirrored ones
 
   const Error* error() const { return !placed ? &placed.error() : !good ? &good.error() : nullptr; }
   bool is_poor() const { return error() != nullptr && error()->kind == ErrorKind::quality; }
 };
 
-/// As the images are; where that comes to nothing, with the camera held otherwise.
-Answer answer_of(const Session& session, const SceneRenderer& renderer,
-                 const OrbitEvidence& evidence, const OrbitFrames& orbit, std::size_t wanted,
-                 const PoseOptions& options, const Progress& progress) {
-  const auto of = [&](const Result<OrbitChoice>& choice) -> Answer {
-    if (!choice) return {tl::unexpected(choice.error()), {}};
-    Answer answer{place_by_renders(session, renderer, *choice, orbit.tracking, options, progress),
-                  {}};
-    if (answer.placed)
-      answer.good = believed(*answer.placed, orbit.stations.size(), wanted, options);
+/// How the stations of a session are placed.
+struct Placing {
+  const Session& session;
+  const SceneRenderer& renderer;
+  const OrbitFrames& orbit;
+  std::size_t wanted;
+  const PoseOptions& options;
+  const Progress& progress;
+
+  Answer operator()(const Result<OrbitChoice>& choice) const {
+    if (!choice) return {tl::unexpected(choice.error())};
+    std::optional<MirroredSupport> mirrored;
+    if (options.check_mirrored) {
+      auto asked = mirrored_support(renderer, *choice, progress);
+      if (!asked) return {tl::unexpected(asked.error())};
+      mirrored = *asked;
+    }
+    if (mirrored && mirrored->told())
+      return {
+          are_mirrored(*mirrored, choice->evidence.turn), {}, mirrored->ratio * choice->support()};
+    Answer answer{place_by_renders(session, renderer, *choice, orbit.tracking, progress)};
+    if (!answer.placed) return answer;
+    if (mirrored)
+      answer.placed->gates["mirrored_lead_standard_errors"] = mirrored->lead_standard_errors;
+    answer.good = believed(*answer.placed, orbit.stations.size(), wanted, options);
     return answer;
-  };
-  const Result<OrbitChoice> as_is = choose_orbit(renderer, evidence, progress);
-  // Views that hardly anything supports take long to refine: first see whether they are turned.
-  const bool weak = as_is && mean_support(as_is->selected.alignment) < usual_support;
-  std::optional<Answer> answer;
-  if (!weak) answer = of(as_is);
-  if (answer && !answer->is_poor()) return *answer;
-  const Result<OrbitChoice> turned = choose_turned_orbit(renderer, evidence, progress);
-  if (!turned || !as_is || turned->clearly_better_than(*as_is)) {
-    Answer other = of(turned);
-    if (!other.is_poor()) return other;
   }
-  return answer ? *answer : of(as_is);
+};
+
+/// As the images are; where that comes to nothing, with the camera held otherwise.
+Answer answer_of(const Placing& place, const OrbitEvidence& evidence) {
+  const Result<OrbitChoice> as_is = choose_orbit(place.renderer, evidence, place.progress);
+  // Views that hardly anything supports take long to refine: first see whether they are turned.
+  const bool weak = as_is && as_is->support() < usual_support;
+  std::optional<Answer> answer;
+  if (!weak) answer = place(as_is);
+  const bool mirrored = answer && answer->mirrored_support > 0;
+  if (answer && !answer->is_poor() && !mirrored) return *answer;
+  const Result<OrbitChoice> turned = choose_turned_orbit(place.renderer, evidence, place.progress);
+  if (!turned && turned.error().kind != ErrorKind::quality) return place(turned);
+  // A thing that is its own mirror image upside down looks mirrored when it is held so.
+  const bool better = turned && (mirrored ? turned->support() >= answer->mirrored_support
+                                 : as_is  ? turned->clearly_better_than(*as_is)
+                                          : turned->support() > 0);
+  if (!better) return answer ? *answer : place(as_is);
+  Answer other = place(turned);
+  // Worse poses of the images as they are would be wrong ones.
+  return other.is_poor() && !as_is ? *answer : other;
 }
 
 /// What may be wrong with the photos where thermal views find no place among them.
@@ -310,20 +345,21 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   ORBITFUSE_ASSIGN(const SceneRenderer renderer,
                    scene_of(visible, evidence.canonical_from_visible, progress));
   tell(2, "search of the orbit");
-  const Answer answer = answer_of(session, renderer, evidence, orbit, wanted, options, progress);
+  const Answer answer = answer_of({session, renderer, orbit, wanted, options, progress}, evidence);
   const Result<PlacedViews>& placed = answer.placed;
   LadderStep step{"cross-modal, orbit prior", false, "", 0, static_cast<int>(wanted), 0};
   step.why = fmt::format("{} lines", evidence.lines.size());
   const auto finish = [&] {
-    if (!step.held) step.why += doubt_of_photos(visible.reconstruction);
     step.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     steps.push_back(step);
   };
-  if (!placed) {
-    step.why += "; " + placed.error().found;
+  const auto fallen = [&](Error error) {
+    error.found += doubt_of_photos(visible.reconstruction);
+    step.why += "; " + error.found;
     finish();
-    return tl::unexpected(placed.error());
-  }
+    return tl::unexpected(std::move(error));
+  };
+  if (!placed) return fallen(placed.error());
   step.attempt = placed->method;
   step.why += placed->why;
 
@@ -334,11 +370,9 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
   for (const auto& [name, why] : orbit.left_out) result.dropped.push_back({name, why});
   take_verdicts(*placed, result);
   step.posed = static_cast<int>(result.reconstruction.views.size());
-  const Status& good = answer.good;
-  step.held = good.has_value();
-  if (!good) step.why += "; " + good.error().found;
+  if (!answer.good) return fallen(answer.good.error());
+  step.held = true;
   finish();
-  if (!good) return tl::unexpected(good.error());
   if (frames.size() > wanted)
     result.skips.push_back({"poses of further tracking frames",
                             fmt::format("{} of {} frames are posed", wanted, frames.size()),

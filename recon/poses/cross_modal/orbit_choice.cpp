@@ -11,9 +11,18 @@
 namespace orbitfuse {
 namespace {
 
-/// What a turn must have more than none.
-constexpr double turned_ratio = 1.5, turned_lead = 2;
-constexpr std::size_t looked_at = 3;
+/// What a turn must have more than none. One of four is best by chance, hence three errors.
+constexpr double turned_ratio = 1.5, turned_lead = 3;
+/// First looks at a turn; of few views the right start comes late (orbit_evidence.cpp).
+constexpr std::size_t looked_at = 3, few_views = 16;
+
+/// Renders are compared at one width, so that a view has the more of its patches the narrower its
+/// image is.
+double support_scale(const OrbitEvidence& evidence) {
+  const Camera& taken = evidence.lens.camera;
+  const double ratio = static_cast<double>(upright(evidence.turn, taken).width) / taken.width;
+  return ratio * ratio;
+}
 
 Result<OrbitChoice> searched(OrbitEvidence evidence, const Progress& progress) {
   OrbitChoice choice{std::move(evidence), {}, {}, {}, {}};
@@ -34,13 +43,21 @@ Status select(const SceneRenderer& renderer, const Progress& progress, OrbitChoi
 /// Support of the hypotheses that the lines like best, at a first look.
 Result<double> first_look(const SceneRenderer& renderer, OrbitChoice& choice,
                           const Progress& progress) {
+  const bool few = choice.blank.size() < few_views;
+  const std::size_t looks = few ? choice.hypotheses.size() : looked_at;
   double best = 0;
-  for (std::size_t h = 0; h < std::min(choice.hypotheses.size(), looked_at); ++h) {
+  for (std::size_t h = 0; h < std::min(choice.hypotheses.size(), looks); ++h) {
     ORBITFUSE_ASSIGN(const RenderAlignment opened, open_orbit({renderer, choice.orbit, progress},
                                                               choice.blank, choice.hypotheses[h]));
     best = std::max(best, mean_support(opened));
   }
-  return best;
+  return best * support_scale(choice.evidence);
+}
+
+std::vector<double> supports(const OrbitChoice& choice) {
+  std::vector<double> result = supports_of(choice.selected.alignment);
+  for (double& one : result) one *= support_scale(choice.evidence);
+  return result;
 }
 
 }  // namespace
@@ -49,10 +66,13 @@ double OrbitChoice::lead() const {
   return selected.lead_standard_errors.value_or(std::numeric_limits<double>::infinity());
 }
 
+double OrbitChoice::support() const {
+  return mean_support(selected.alignment) * support_scale(evidence);
+}
+
 bool OrbitChoice::clearly_better_than(const OrbitChoice& other) const {
-  const RenderAlignment &mine = selected.alignment, &others = other.selected.alignment;
-  return mean_support(mine) >= turned_ratio * mean_support(others) &&
-         orbitfuse::lead_standard_errors(mine, others) >= turned_lead;
+  return support() >= turned_ratio * other.support() &&
+         lead_standard_errors(supports(*this), supports(other)) >= turned_lead;
 }
 
 Result<OrbitChoice> choose_orbit(const SceneRenderer& renderer, const OrbitEvidence& evidence,

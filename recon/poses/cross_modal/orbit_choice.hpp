@@ -16,6 +16,9 @@ struct OrbitChoice {
 
   /// Of the best start over a rival; infinite without one.
   double lead() const;
+  /// Mean of the views', as far as a turn doesn't change it: images on their side are compared at
+  /// another angular resolution.
+  double support() const;
   /// Of the same views, turned otherwise.
   bool clearly_better_than(const OrbitChoice& other) const;
 };

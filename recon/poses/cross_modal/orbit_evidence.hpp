@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "core/geometry/quarter_turn.hpp"
 #include "recon/poses/cross_modal/orbit_search.hpp"
-#include "recon/poses/cross_modal/quarter_turn.hpp"
 #include "recon/poses/thermal_lens.hpp"
 
 namespace orbitfuse {

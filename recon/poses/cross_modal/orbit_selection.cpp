@@ -165,13 +165,23 @@ double mean_support(const RenderAlignment& alignment) {
   return sum / static_cast<double>(std::max<std::size_t>(alignment.views.size(), 1));
 }
 
+std::vector<double> supports_of(const RenderAlignment& alignment) {
+  std::vector<double> supports;
+  for (const RenderAlignedView& view : alignment.views) supports.push_back(view.support());
+  return supports;
+}
+
 double lead_standard_errors(const RenderAlignment& better, const RenderAlignment& other) {
+  return lead_standard_errors(supports_of(better), supports_of(other));
+}
+
+double lead_standard_errors(const std::vector<double>& better, const std::vector<double>& other) {
   double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < better.views.size(); ++i) {
-    const double d = better.views[i].support() - other.views[i].support();
+  for (std::size_t i = 0; i < better.size(); ++i) {
+    const double d = better[i] - other[i];
     sum += d, squares += d * d;
   }
-  const auto n = static_cast<double>(better.views.size());
+  const auto n = static_cast<double>(better.size());
   const double variance = std::max(squares / n - (sum / n) * (sum / n), 1e-12);
   return (sum / n) / std::sqrt(variance / n);
 }

@@ -33,7 +33,10 @@ struct SelectedOrbit {
 /// Over the views.
 double mean_support(const RenderAlignment& alignment);
 
+std::vector<double> supports_of(const RenderAlignment& alignment);
+
 /// Mean difference of the same views' supports, in its own standard errors.
+double lead_standard_errors(const std::vector<double>& better, const std::vector<double>& other);
 double lead_standard_errors(const RenderAlignment& better, const RenderAlignment& other);
 
 /// Some of the views, enough to tell hypotheses apart, at the search's best places after two

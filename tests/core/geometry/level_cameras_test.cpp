@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "core/numeric/angle_units.hpp"
@@ -10,23 +11,41 @@
 namespace orbitfuse {
 namespace {
 
-/// Level cameras that look at the origin from a distance of 3, each turned about its own axis.
+/// A level camera that looks at the origin from a distance of 3, then turned about its own axis.
+Rigid3d camera_at(double azimuth_deg, double elevation_deg, double roll_deg = 0) {
+  const double azimuth = azimuth_deg / degrees_per_radian;
+  const double elevation = elevation_deg / degrees_per_radian;
+  const Eigen::Vector3d out(std::cos(elevation) * std::cos(azimuth),
+                            std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+  Eigen::Matrix3d axes;
+  axes.row(2) = -out;
+  axes.row(0) = (-out).cross(Eigen::Vector3d::UnitZ()).normalized();
+  axes.row(1) = axes.row(2).cross(axes.row(0));
+  const Eigen::Quaterniond roll(
+      Eigen::AngleAxisd(roll_deg / degrees_per_radian, Eigen::Vector3d::UnitZ()));
+  return {roll * Eigen::Quaterniond(axes), {0, 0, 3}};
+}
+
 std::vector<Rigid3d> orbit(double arc_deg, double elevation_deg, double roll_deg = 0) {
-  const double radians = 1 / degrees_per_radian;
   std::vector<Rigid3d> cameras;
-  for (int i = 0; i < 12; ++i) {
-    const double azimuth = arc_deg * i / 12 * radians;
-    const double elevation = (elevation_deg + i % 2) * radians;
-    const Eigen::Vector3d out(std::cos(elevation) * std::cos(azimuth),
-                              std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-    Eigen::Matrix3d axes;
-    axes.row(2) = -out;
-    axes.row(0) = (-out).cross(Eigen::Vector3d::UnitZ()).normalized();
-    axes.row(1) = axes.row(2).cross(axes.row(0));
-    const Eigen::Quaterniond roll(Eigen::AngleAxisd(roll_deg * radians, Eigen::Vector3d::UnitZ()));
-    cameras.push_back({roll * Eigen::Quaterniond(axes), {0, 0, 3}});
-  }
+  for (int i = 0; i < 12; ++i)
+    cameras.push_back(camera_at(arc_deg * i / 12, elevation_deg + i % 2, roll_deg));
   return cameras;
+}
+
+TEST(LevelCameras, UprightOnesThatClimbMoreThanTheyWalkAreNotOnTheirSide) {
+  // Half a width of azimuth; elevations.
+  const std::array<std::array<double, 3>, 4> climbs = {
+      {{15, 5, 65}, {25, 0, 89}, {10, -20, 20}, {0, 5, 80}}};
+  for (const auto& [reach_deg, low_deg, high_deg] : climbs) {
+    std::vector<Rigid3d> cameras;
+    for (int i = 0; i < 5; ++i)
+      for (int j = 0; j < 5; ++j)
+        cameras.push_back(
+            camera_at(reach_deg * (i - 2) / 2.0, low_deg + (high_deg - low_deg) * j / 4));
+    EXPECT_FALSE(held_on_side(cameras)) << reach_deg << " " << high_deg;
+    EXPECT_GT(up_direction(cameras).z(), 0.5) << reach_deg << " " << high_deg;
+  }
 }
 
 TEST(LevelCameras, UpOfAnyArcAndElevationIsTheCamerasOwn) {

@@ -74,6 +74,7 @@ struct BoxOrbit {
 inline BoxOrbit box_orbit(bool both, int width = 320) {
   BoxOrbit orbit;
   orbit.camera = camera(1000).scaled_to(width, width * 3 / 4);
+  orbit.camera.cx += width / 80.0, orbit.camera.cy -= width / 100.0;
   for (int i = 0; i < 16; ++i) {
     Station station;
     station.loop = i / 8, station.azimuth_deg = 45.0 * (i % 8);

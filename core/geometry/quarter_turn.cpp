@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "recon/poses/cross_modal/quarter_turn.hpp"
+#include "core/geometry/quarter_turn.hpp"
 
 #include <cmath>
 #include <numbers>
