@@ -74,10 +74,12 @@ std::string words(const SelectedOrbit& selected) {
   return text;
 }
 
-const char* held(QuarterTurn turn) { return turn.clockwise == 2 ? "upside down" : "on its side"; }
+const char* how_held(QuarterTurn turn) {
+  return turn.clockwise == 2 ? "upside down" : "on its side";
+}
 
 std::string words(QuarterTurn turn) {
-  return turn.clockwise == 0 ? "" : fmt::format("; the camera was held {}", held(turn));
+  return turn.clockwise == 0 ? "" : fmt::format("; the camera was held {}", how_held(turn));
 }
 
 std::string loops_in_doubt(const std::vector<int>& loops) {
@@ -141,7 +143,7 @@ void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
     placed.warnings.push_back(fmt::format(
         "the thermal camera was held {} against the visible one: its images fit the scene turned "
         "by {:.0f} deg, and are posed so",
-        held(turn), turn.degrees()));
+        how_held(turn), turn.degrees()));
     placed.gates["images_turned_deg"] = turn.degrees();
   }
   placed.gates["focal_px"] = lens.camera.fx;
@@ -199,7 +201,7 @@ Result<PlacedViews> place_by_renders(const Session& session, const SceneRenderer
 }
 
 /// Views that are kept, of the first `count`.
-int kept(const PlacedViews& placed, std::size_t count) {
+int count_kept(const PlacedViews& placed, std::size_t count) {
   return static_cast<int>(std::count_if(
       placed.views.begin(), placed.views.begin() + static_cast<std::ptrdiff_t>(count),
       [](const PlacedView& view) { return view.verdict.confidence != Confidence::dropped; }));
@@ -208,14 +210,14 @@ int kept(const PlacedViews& placed, std::size_t count) {
 /// The answer as a whole: enough stations, and most of them sure. Frames between them come and go.
 Status believed(const PlacedViews& placed, std::size_t stations, std::size_t wanted,
                 const PoseOptions& options) {
-  const double posed = kept(placed, stations);
+  const double posed = count_kept(placed, stations);
   double sure = 0;
   for (std::size_t i = 0; i < stations; ++i) sure += placed.views[i].verdict.sure() ? 1 : 0;
   const auto all = static_cast<double>(stations);
   if (posed >= options.min_posed_ratio * all && sure >= min_sure_ratio * all) return {};
   std::string found =
       fmt::format("{} of {} thermal views are placed, {:.0f} of {} stations for sure",
-                  kept(placed, placed.views.size()), wanted, sure, stations);
+                  count_kept(placed, placed.views.size()), wanted, sure, stations);
   for (const std::string& warning : placed.warnings) found += "; " + warning;
   std::map<std::string, int> reasons;
   for (const PlacedView& view : placed.views)

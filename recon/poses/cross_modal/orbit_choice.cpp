@@ -13,8 +13,8 @@ namespace {
 
 /// What a turn must have more than none. One of four is best by chance, hence three errors.
 constexpr double turned_ratio = 1.5, turned_lead = 3;
-/// First looks at a turn; of few views the right start comes late (orbit_evidence.cpp).
-constexpr std::size_t looked_at = 3, few_views = 16;
+/// First looks at a turn; of few views the right start comes late.
+constexpr std::size_t looked_at = 3;
 
 /// Renders are compared at one width, so that a view has the more of its patches the narrower its
 /// image is.

@@ -15,9 +15,6 @@
 namespace orbitfuse {
 namespace {
 
-/// Below, the search leaves more to renders.
-constexpr std::size_t few_views = 16;
-
 /// Lines that enough views confirm: as many witnesses as still leave a few hundred lines.
 std::vector<EdgeLine> confirmed(const std::vector<EdgeLine>& lines) {
   for (const std::size_t views : {5u, 4u, 3u}) {

@@ -9,6 +9,9 @@
 
 namespace orbitfuse {
 
+/// Below, the search leaves more to renders.
+inline constexpr std::size_t few_views = 16;
+
 /// All that placing the stations needs, read once.
 struct OrbitEvidence {
   LensGuess lens;
