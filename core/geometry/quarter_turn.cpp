@@ -37,7 +37,7 @@ Camera upright(QuarterTurn turn, const Camera& taken) {
 PosedView as_taken(QuarterTurn turn, const PosedView& upright_view) {
   const Eigen::AngleAxisd back(-turn.clockwise * std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
   const Rigid3d taken_from_upright{Eigen::Quaterniond(back), Eigen::Vector3d::Zero()};
-  return {upright_view.name, upright({(4 - turn.clockwise) % 4}, upright_view.camera),
+  return {upright_view.name, upright(turn.back(), upright_view.camera),
           taken_from_upright * upright_view.cam_from_world};
 }
 

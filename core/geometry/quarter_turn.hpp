@@ -12,6 +12,7 @@ struct QuarterTurn {
   int clockwise = 0;  ///< 0 to 3: how often the image as taken is turned to be upright
 
   double degrees() const { return 90.0 * clockwise; }
+  QuarterTurn back() const { return {(4 - clockwise) % 4}; }
 };
 
 /// The image, and the camera that would have taken it without the turn.

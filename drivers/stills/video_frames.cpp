@@ -14,6 +14,7 @@
 
 #include "capture/image_quality/frame_motion.hpp"
 #include "capture/image_quality/frame_quality.hpp"
+#include "core/geometry/quarter_turn.hpp"
 #include "core/image/image_codec.hpp"
 #include "core/option_range.hpp"
 #include "core/system/file_io.hpp"
@@ -51,7 +52,7 @@ class Reader {
     if (!reader.capture_.isOpened())
       return unreadable(file, "a video that can't be read (is its end missing?)");
     reader.capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
-    reader.clockwise_deg_ = clockwise_deg(reader.capture_);
+    reader.turn_ = turn_of(reader.capture_);
     const double samples = 3 * reader.capture_.get(cv::CAP_PROP_FRAME_WIDTH) *
                            reader.capture_.get(cv::CAP_PROP_FRAME_HEIGHT);
     if (!(samples > 0 && samples <= static_cast<double>(max_image_samples)))
@@ -67,9 +68,7 @@ class Reader {
       return false;
     }
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
-    if (clockwise_deg_ == 90) cv::rotate(image, image, cv::ROTATE_90_CLOCKWISE);
-    if (clockwise_deg_ == 180) cv::rotate(image, image, cv::ROTATE_180);
-    if (clockwise_deg_ == 270) cv::rotate(image, image, cv::ROTATE_90_COUNTERCLOCKWISE);
+    image = upright(turn_, image);
     return image.type() == CV_8UC3;
   }
   std::optional<std::int64_t> time_ns() const {
@@ -85,14 +84,15 @@ class Reader {
 
  private:
   /// OpenCV before 4.7 takes FFmpeg's angle for clockwise, and would turn the picture by it.
-  static int clockwise_deg(const cv::VideoCapture& capture) {
+  static QuarterTurn turn_of(const cv::VideoCapture& capture) {
     const int told = cvRound(capture.get(cv::CAP_PROP_ORIENTATION_META));
     const bool reversed = CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR < 7;
-    return ((reversed ? -told : told) % 360 + 360) % 360;
+    const int clockwise_deg = ((reversed ? -told : told) % 360 + 360) % 360;
+    return {clockwise_deg % 90 == 0 ? clockwise_deg / 90 : 0};
   }
 
   cv::VideoCapture capture_;
-  int clockwise_deg_ = 0;
+  QuarterTurn turn_;
 };
 
 /// What is kept of each frame of the first reading.

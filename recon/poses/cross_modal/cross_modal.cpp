@@ -8,7 +8,6 @@
 #include <limits>
 #include <optional>
 
-#include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "core/system/trace.hpp"
 #include "recon/poses/cross_modal/mirrored_views.hpp"
@@ -132,11 +131,6 @@ PlacedView as_taken(QuarterTurn turn, const Camera& lens, const RenderAlignedVie
   return {taken, view.verdict, view.agreement, view.median_px};
 }
 
-double longer_side_deg(const Camera& camera) {
-  return 2 * std::atan(std::max(camera.width, camera.height) / (2 * camera.fx)) *
-         degrees_per_radian;
-}
-
 /// How the camera was held, and what came of its lens.
 void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
   if (turn.clockwise != 0) {
@@ -146,6 +140,8 @@ void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
         how_held(turn), turn.degrees()));
     placed.gates["images_turned_deg"] = turn.degrees();
   }
+  const double longer_side_deg =
+      std::max(lens.camera.horizontal_fov_deg(), upright({1}, lens.camera).horizontal_fov_deg());
   placed.gates["focal_px"] = lens.camera.fx;
   placed.gates["lens_k1"] = lens.camera.k1;
   if (lens.guessed)
@@ -153,7 +149,7 @@ void tell_camera(const LensGuess& lens, QuarterTurn turn, PlacedViews& placed) {
         fmt::format("the thermal lens is unknown: 33 degrees were assumed to begin with, and "
                     "{:.1f} found ({:.0f} px); give its focal length (import --thermal-focal-px) "
                     "if you know it better",
-                    longer_side_deg(lens.camera), lens.camera.fx));
+                    longer_side_deg, lens.camera.fx));
 }
 
 /// Aligns the views of a chosen start with renders, then the frames recorded between the stations,
@@ -289,12 +285,12 @@ Answer answer_of(const Placing& place, const OrbitEvidence& evidence) {
 }
 
 /// What may be wrong with the photos where thermal views find no place among them.
-std::string doubt_of_photos(const Reconstruction& visible) {
-  const Similarity3d canonical = canonical_from_world(visible.views, {});
+std::string doubt_of_photos(const Reconstruction& visible,
+                            const Similarity3d& canonical_from_visible) {
   std::vector<double> elevations_deg;
   for (const PosedView& view : visible.views)
     elevations_deg.push_back(
-        orbit_angles(canonical * camera_center(view.cam_from_world)).elevation_deg);
+        orbit_angles(canonical_from_visible * camera_center(view.cam_from_world)).elevation_deg);
   if (elevations_deg.empty() || median(elevations_deg) > below_deg) return {};
   return fmt::format("; the photos look up at the object, by {:.0f} deg: are they upside down?",
                      -median(elevations_deg));
@@ -356,7 +352,7 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
     steps.push_back(step);
   };
   const auto fallen = [&](Error error) {
-    error.found += doubt_of_photos(visible.reconstruction);
+    error.found += doubt_of_photos(visible.reconstruction, evidence.canonical_from_visible);
     step.why += "; " + error.found;
     finish();
     return tl::unexpected(std::move(error));

@@ -25,7 +25,7 @@ double support_scale(const OrbitEvidence& evidence) {
 }
 
 Result<OrbitChoice> searched(OrbitEvidence evidence, const Progress& progress) {
-  OrbitChoice choice{std::move(evidence), {}, {}, {}, {}};
+  OrbitChoice choice{std::move(evidence)};
   ORBITFUSE_ASSIGN(choice.hypotheses, search(choice.evidence, progress));
   choice.orbit.images = choice.evidence.images;
   choice.orbit.canonical_from_world = choice.evidence.canonical_from_visible;

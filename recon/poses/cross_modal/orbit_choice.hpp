@@ -9,10 +9,10 @@ namespace orbitfuse {
 /// Where an orbit was begun, and how its camera was held.
 struct OrbitChoice {
   OrbitEvidence evidence;
-  std::vector<OrbitHypothesis> hypotheses;
-  OrbitViews orbit;
-  std::vector<PosedView> blank;
-  SelectedOrbit selected;
+  std::vector<OrbitHypothesis> hypotheses = {};
+  OrbitViews orbit = {};
+  std::vector<PosedView> blank = {};
+  SelectedOrbit selected = {};
 
   /// Of the best start over a rival; infinite without one.
   double lead() const;

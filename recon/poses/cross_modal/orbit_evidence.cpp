@@ -52,14 +52,8 @@ Result<OrbitEvidence> gather_evidence(const Session& session, const Reconstructi
   std::vector<Eigen::Vector3d> centers;
   for (const PosedView& view : canonical.views)
     centers.push_back(camera_center(view.cam_from_world));
-  OrbitEvidence evidence{lens_of(session, *stations.front()),
-                         LineModel(lines, centers),
-                         stations,
-                         {},
-                         {},
-                         {},
-                         canonical_from_visible,
-                         1};
+  OrbitEvidence evidence{lens_of(session, *stations.front()), LineModel(lines, centers), stations};
+  evidence.canonical_from_visible = canonical_from_visible;
   const Camera& lens = evidence.lens.camera;
   for (std::size_t i = 0; i < stations.size(); ++i) {
     ORBITFUSE_ASSIGN(cv::Mat values, straight_luminance(session, *stations[i], lens));

@@ -17,10 +17,10 @@ struct OrbitEvidence {
   LensGuess lens;
   LineModel lines;
   std::vector<const FrameRecord*> frames;
-  QuarterTurn turn;             ///< that makes the frames upright
-  std::vector<cv::Mat> images;  ///< upright, one a frame
-  std::vector<SearchView> search;
-  Similarity3d canonical_from_visible;
+  QuarterTurn turn = {};             ///< that makes the frames upright
+  std::vector<cv::Mat> images = {};  ///< upright, one a frame
+  std::vector<SearchView> search = {};
+  Similarity3d canonical_from_visible = {};
   double similar_distance = 1;  ///< from where the thermal image shows as much as the visible one
 };
 

@@ -21,13 +21,13 @@ TEST(QuarterTurn, PosesOfUprightImagesBecomeThoseOfTheImagesAsTaken) {
   cv::Mat image(taken.height, taken.width, CV_8U, cv::Scalar(0));
   image.at<uchar>(static_cast<int>(seen.y()), static_cast<int>(seen.x())) = 1;
   for (int quarters = 0; quarters < 4; ++quarters) {
-    const QuarterTurn turn{quarters}, back{(4 - quarters) % 4};
+    const QuarterTurn turn{quarters};
     const cv::Mat turned = upright(turn, image);
     const Camera camera = upright(turn, taken);
     ASSERT_EQ(turned.size(), cv::Size(camera.width, camera.height)) << quarters;
 
     // The upright camera's pose is the taken one's, turned the other way.
-    const PosedView upright_view = as_taken(back, {"a", taken, taken_from_world});
+    const PosedView upright_view = as_taken(turn.back(), {"a", taken, taken_from_world});
     EXPECT_EQ(upright_view.camera, camera) << quarters;
     const Eigen::Vector2d pixel = camera.project(upright_view.cam_from_world * point);
     EXPECT_EQ(at(turned, pixel), 1) << quarters;

@@ -12,16 +12,11 @@ namespace {
 /// Of a camera that was held so that its images need `turn`.
 Result<OrbitChoice> choice_of_views_held(QuarterTurn turn) {
   const testing_orbit::BoxOrbit boxes = testing_orbit::box_orbit(true, 160);
-  const QuarterTurn held{(4 - turn.clockwise) % 4};
+  const QuarterTurn held = turn.back();
   std::vector<FrameRecord> frames(boxes.images.size());
-  OrbitEvidence evidence{{upright(held, boxes.camera), 0.03, 0, false},
-                         testing_orbit::box_lines(true),
-                         {},
-                         {},
-                         {},
-                         {},
-                         {},
-                         testing_orbit::box_orbit_radius};
+  OrbitEvidence evidence{
+      {upright(held, boxes.camera), 0.03, 0, false}, testing_orbit::box_lines(true), {}};
+  evidence.similar_distance = testing_orbit::box_orbit_radius;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     frames[i].file = "view" + std::to_string(i);
     frames[i].station = boxes.stations[i];
