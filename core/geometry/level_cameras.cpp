@@ -3,6 +3,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "core/geometry/nearest_to_lines.hpp"
@@ -93,6 +94,18 @@ Eigen::Vector3d up_direction(const std::vector<Rigid3d>& cameras) {
   if (!side && right.round() < least_round) return mean_up.normalized();
   const Eigen::Vector3d up = (side ? down : right).least();
   return up.dot(mean_up) < 0 ? Eigen::Vector3d(-up) : up;
+}
+
+double share_not_upright(const std::vector<Rigid3d>& cameras, const Eigen::Vector3d& up) {
+  constexpr double straight_down = 0.97;
+  double asked = 0, not_upright = 0;
+  for (const Rigid3d& camera : cameras) {
+    const Eigen::Vector3d in_cam = camera.rotation * up;
+    if (!(std::abs(in_cam.z()) < straight_down)) continue;
+    ++asked;
+    not_upright += in_cam.y() < -std::abs(in_cam.x()) ? 0 : 1;
+  }
+  return asked > 0 ? not_upright / asked : 0;
 }
 
 }  // namespace orbitfuse

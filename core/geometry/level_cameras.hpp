@@ -23,4 +23,7 @@ bool held_on_side(const std::vector<Rigid3d>& cameras);
 /// where they stand above what they look at. Falls back to the mean up when the axes are parallel.
 Eigen::Vector3d up_direction(const std::vector<Rigid3d>& cameras);
 
+/// Of the cameras that don't look straight down, how many `up` lies beside or below in their image.
+double share_not_upright(const std::vector<Rigid3d>& cameras, const Eigen::Vector3d& up);
+
 }  // namespace orbitfuse

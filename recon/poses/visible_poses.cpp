@@ -13,10 +13,20 @@ namespace {
 
 /// Which side the cameras lay on nothing says for sure.
 void tell_side(ModalityPoses& poses) {
-  if (!held_on_side(cameras_of(poses.reconstruction.views))) return;
-  poses.warnings.push_back(
-      "the photos lie on their side: up is taken to be where their cameras stand above what they "
-      "look at; if new views are upside down, turn the photos upright and import them again");
+  const std::vector<Rigid3d> cameras = cameras_of(poses.reconstruction.views);
+  if (held_on_side(cameras)) {
+    poses.warnings.push_back(
+        "the photos lie on their side: up is taken to be where their cameras stand above what they "
+        "look at; if new views are upside down, turn the photos upright and import them again");
+    return;
+  }
+  constexpr double usual_share = 0.2;  // single ones don't change what is up
+  const double share = share_not_upright(cameras, up_direction(cameras));
+  if (share > usual_share)
+    poses.warnings.push_back(fmt::format(
+        "the photos don't agree which way is up: {:.0f} % of them would lie on their side or "
+        "upside down; if new views are tilted, turn the photos upright and import them again",
+        100 * share));
 }
 
 }  // namespace

@@ -68,6 +68,20 @@ TEST(LevelCameras, CamerasOnTheirSideStandAboveWhatTheyLookAt) {
     }
 }
 
+TEST(LevelCameras, CamerasThatDisagreeAboutUpAreCounted) {
+  const auto share = [](const std::vector<Rigid3d>& cameras) {
+    return share_not_upright(cameras, up_direction(cameras));
+  };
+  for (const double elevation_deg : {0.0, 20.0, 50.0, 75.0, 88.0})
+    for (const double roll_deg : {0.0, 15.0})
+      EXPECT_EQ(share(orbit(360, elevation_deg, roll_deg)), 0) << elevation_deg << " " << roll_deg;
+  std::vector<Rigid3d> half = orbit(360, 20);
+  for (const Rigid3d& lying : orbit(360, 20, 90)) half.push_back(lying);
+  EXPECT_GT(share(half), 0.2);
+  EXPECT_GT(share(orbit(360, 50, 90)), 0.2);  // not seen to lie on their side
+  EXPECT_EQ(share_not_upright({}, Eigen::Vector3d::UnitZ()), 0);
+}
+
 TEST(LevelCameras, NoneOrOneOrParallelOnesHaveAnAnswer) {
   EXPECT_FALSE(held_on_side({}));
   EXPECT_FALSE(look_at_point({}).allFinite());
