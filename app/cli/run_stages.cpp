@@ -374,14 +374,15 @@ Status StagedRun::run(bool whole) {
   Status written = record(summary, list);
   if (written && planner_ && !options_.dry_run && !summary.stages.empty())
     written = planner_->save(summary.stages);
-  if (summary.error) return tl::unexpected(*summary.error);
-  ORBITFUSE_TRY(written);
   const StageStatus* report = summary.find("report");
   if (report && report->done()) {
+    // It tells of a failure as well.
     const std::string page = (fs::path(folders_.out) / "report" / "report.html").string();
     context_.result["report"] = page;
     context_.console.data(page);
   }
+  if (summary.error) return tl::unexpected(*summary.error);
+  ORBITFUSE_TRY(written);
   return {};
 }
 

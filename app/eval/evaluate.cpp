@@ -16,6 +16,7 @@
 #include "app/stages/artifacts.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
+#include "app/stages/session_input.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "core/geometry/pose_error.hpp"
@@ -154,6 +155,7 @@ Status add_registration(Run& run, const Session& session, const GroundTruth& tru
 struct Sums {
   double visible_psnr = 0, mae_k = 0, thermal_psnr = 0, covered = 0;
   int visible = 0, thermal = 0;
+  LevelPairs levels;  ///< of a field of gray levels
 };
 
 /// A true view's image at the size of a camera narrowed from its own; of other proportions than
@@ -201,14 +203,18 @@ Status compare_visible(DetailedField& shown, const TrueTestView& view, const Cam
 }
 
 Status compare_thermal(DetailedField& shown, const TrueTestView& view, const Camera& camera,
-                       const Rigid3d& cam_from_thermal, const EvaluateOptions& options,
-                       const Progress& progress, Sums& sums) {
+                       const Rigid3d& cam_from_thermal, Samples samples,
+                       const EvaluateOptions& options, const Progress& progress, Sums& sums) {
   ORBITFUSE_ASSIGN(nerf::RenderedView seen, shown.render(camera, cam_from_thermal, {}, progress));
   ORBITFUSE_ASSIGN(const cv::Mat truth,
                    true_image(view.thermal, Samples::kelvin, view.camera, camera));
   seen.color.setTo(std::nanf(""), seen.opacity < options.min_opacity);
-  const ThermalViewError error =
-      thermal_view_error(seen.color, truth, kelvin_from_celsius(options.scene_above_c));
+  const double scene_above_k = kelvin_from_celsius(options.scene_above_c);
+  if (samples == Samples::gray) {
+    sums.levels.add(seen.color, truth, scene_above_k);
+    return {};
+  }
+  const ThermalViewError error = thermal_view_error(seen.color, truth, scene_above_k);
   if (!std::isfinite(error.mae_k)) return {};
   sums.mae_k += error.mae_k;
   sums.covered += error.covered;
@@ -241,7 +247,8 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
     if (!thermal.empty() && !view.thermal.empty())
       ORBITFUSE_TRY(compare_thermal(thermal, view, camera,
                                     rebase(cam_from_visible, run.visible_from_thermal.inverse()),
-                                    options, progress, sums));
+                                    stages::samples_of(session, Modality::thermal), options,
+                                    progress, sums));
   }
   json result = {{"views", truth.test.size()}};
   if (sums.visible > 0) {
@@ -256,6 +263,11 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
     result["temperature_mae_c"] = sums.mae_k / sums.thermal;
     result["thermal_psnr_db"] = sums.thermal_psnr / sums.thermal;
     result["thermal_covered"] = sums.covered / sums.thermal;
+  }
+  if (!sums.levels.level.empty()) {
+    const LevelError error = level_error(sums.levels);
+    result["gray_rank_correlation"] = error.rank_correlation;
+    result["gray_mae_c"] = error.mae_k;
   }
   run.result["test_views"] = result;
   return {};

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "app/eval/image_error.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
+
+#include "core/numeric/median.hpp"
 
 namespace orbitfuse::eval {
 
@@ -39,6 +43,69 @@ ThermalViewError thermal_view_error(const cv::Mat& rendered_k, const cv::Mat& tr
   error.psnr_db = squared > 0 ? 10 * std::log10((high - low) * (high - low) * n / squared)
                               : std::numeric_limits<double>::infinity();
   return error;
+}
+
+void LevelPairs::add(const cv::Mat& levels, const cv::Mat& truth_k, double scene_above_k) {
+  CV_Assert(levels.size() == truth_k.size());
+  for (int y = 0; y < truth_k.rows; ++y)
+    for (int x = 0; x < truth_k.cols; ++x) {
+      const float t = truth_k.at<float>(y, x), l = levels.at<float>(y, x);
+      if (!(t > scene_above_k) || !std::isfinite(t) || !std::isfinite(l)) continue;
+      level.push_back(l);
+      kelvin.push_back(t);
+    }
+}
+
+namespace {
+
+std::vector<std::size_t> order_of(const std::vector<float>& values) {
+  std::vector<std::size_t> order(values.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
+  return order;
+}
+
+/// Equal values share their mean rank.
+std::vector<double> ranks_of(const std::vector<float>& values) {
+  const std::vector<std::size_t> order = order_of(values);
+  std::vector<double> ranks(values.size());
+  for (std::size_t i = 0; i < order.size();) {
+    std::size_t end = i;
+    while (end < order.size() && values[order[end]] == values[order[i]]) ++end;
+    for (std::size_t k = i; k < end; ++k)
+      ranks[order[k]] = 0.5 * static_cast<double>(i + end - 1);
+    i = end;
+  }
+  return ranks;
+}
+
+}  // namespace
+
+LevelError level_error(const LevelPairs& pairs) {
+  constexpr std::size_t groups = 256;
+  const double nothing = std::nan("");
+  if (pairs.level.empty()) return {nothing, nothing};
+  const std::vector<double> a = ranks_of(pairs.level), b = ranks_of(pairs.kelvin);
+  const double middle = 0.5 * static_cast<double>(a.size() - 1);
+  double both = 0, of_a = 0, of_b = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    both += (a[i] - middle) * (b[i] - middle);
+    of_a += (a[i] - middle) * (a[i] - middle);
+    of_b += (b[i] - middle) * (b[i] - middle);
+  }
+  if (!(of_a > 0)) return {nothing, nothing};
+  const std::vector<std::size_t> order = order_of(pairs.level);
+  double off = 0;
+  for (std::size_t g = 0; g < groups; ++g) {
+    std::vector<double> kelvin;
+    for (std::size_t i = g * order.size() / groups; i < (g + 1) * order.size() / groups; ++i)
+      kelvin.push_back(static_cast<double>(pairs.kelvin[order[i]]));
+    const double usual = median(kelvin);
+    for (const double k : kelvin) off += std::abs(k - usual);
+  }
+  return {of_b > 0 ? both / std::sqrt(of_a * of_b) : nothing,
+          off / static_cast<double>(order.size())};
 }
 
 }  // namespace orbitfuse::eval

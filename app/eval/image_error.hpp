@@ -2,6 +2,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <vector>
 
 namespace orbitfuse::eval {
 
@@ -17,5 +18,22 @@ struct ThermalViewError {
 /// Pixels of `truth_k` at or below `scene_above_k` are not scene.
 ThermalViewError thermal_view_error(const cv::Mat& rendered_k, const cv::Mat& truth_k,
                                     double scene_above_k);
+
+/// Gray levels and true temperatures of the same pixels, of all views.
+struct LevelPairs {
+  std::vector<float> level, kelvin;
+
+  /// As thermal_view_error() takes pixels.
+  void add(const cv::Mat& levels, const cv::Mat& truth_k, double scene_above_k);
+};
+
+struct LevelError {
+  double rank_correlation = 0;  ///< Spearman's: 1 where warmer always is brighter
+  /// How far off temperatures are where each level stands for the one it usually has, mean.
+  double mae_k = 0;
+};
+
+/// NaN where there are no pairs, or one level alone.
+LevelError level_error(const LevelPairs& pairs);
 
 }  // namespace orbitfuse::eval

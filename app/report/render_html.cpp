@@ -313,7 +313,12 @@ std::string to_html(const Model& model) {
   html += "<ul class=\"facts\">";
   for (const auto& [key, value] : model.headline)
     html += fmt::format("<li><b>{}</b><span>{}</span></li>", escape(value), escape(key));
-  html += "</ul>\n" + viewer(model, views) + poses_section(model) + registration_section(model);
+  html += "</ul>\n";
+  if (!model.warnings.empty())
+    html += fmt::format(
+        "<p class=\"notice\" role=\"note\"><a href=\"#h-warn\">{} warning{}</a>, below.</p>\n",
+        model.warnings.size(), model.warnings.size() == 1 ? "" : "s");
+  html += viewer(model, views) + poses_section(model) + registration_section(model);
   if (!model.measurements.rows.empty())
     html +=
         "<section aria-labelledby=\"h-measured\"><h2 id=\"h-measured\">Saved measurements</h2>\n" +

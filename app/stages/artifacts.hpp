@@ -15,6 +15,7 @@
 #include "core/geometry/transform.hpp"
 #include "core/json_fields.hpp"
 #include "core/session/session.hpp"
+#include "recon/nerf/dataset.hpp"
 
 // What stages leave for each other, in formats that other tools read (docs/formats.md).
 namespace orbitfuse::stages {
@@ -69,6 +70,8 @@ struct TrainedFrames {
   std::map<std::string, std::array<double, 3>> gains;
   std::map<std::string, double> offsets_k;  ///< the camera's drift in a frame; of the others none
   double shading_k = 0;              ///< nerf::shading_image(): in every frame, not in the field
+  /// From a gray thermal frame's levels to the field's; empty: they are.
+  std::map<std::string, nerf::GrayCurve> gray_curves;
   std::vector<std::string> heldout;  ///< that the field did not learn from
   double heldout_psnr_db = std::numeric_limits<double>::quiet_NaN();  ///< NaN: there were none
   int width_px = 0;

@@ -134,6 +134,9 @@ Result<std::string> measurement_identity(const fs::path& out, const Session& ses
 Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& session,
                                             const measurement::MeasurementOptions& options) {
   const pipeline::StageContext context = context_of_run(out);
+  if (session.frames_of(Modality::thermal).empty())
+    return fail(ErrorKind::input, session.folder.string(), "the session has no thermal frames",
+                "temperatures are measured in sessions that have some: import --thermal");
   for (const char* stage : {"poses_thermal", "train_thermal"})
     if (!context.has(stage))
       return fail(ErrorKind::input, out.string(), std::string(stage) + " is not finished in it",

@@ -73,6 +73,8 @@ Status score_field(const StageContext& context, const StageInputs& in, Modality 
     ORBITFUSE_TRY(
         detail.add(field, view.camera, view.cam_from_world, seen, context.progress, view.name));
     cv::Mat truth = view.image, rendered = seen.color;
+    if (const auto curve = trained.gray_curves.find(view.name); curve != trained.gray_curves.end())
+      truth = nerf::to_common_levels(truth, curve->second);
     if (modality == Modality::visible) {
       // The field shows the common exposure, the frame its own.
       if (const auto found = trained.gains.find(view.name); found != trained.gains.end()) {
@@ -186,7 +188,7 @@ Result<StageOutput> score(const StageContext& context, const StageInputs& in) {
 pipeline::Stage metrics_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "metrics";
-  stage.version = 6;  // thermal frames' shading
+  stage.version = 7;  // gray thermal frames
   stage.options = in.config->settings().to_json("metrics");
   stage.uses = {"poses_visible", "poses_thermal", "train_visible",
                 "train_thermal", "render",        "fuse"};

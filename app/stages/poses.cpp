@@ -136,7 +136,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   stage.name = "poses_" + std::string(name(modality));
   stage.version = 20;  // worlds of cameras that were held on their side
   if (!visible) {
-    stage.version = 25;  // cameras held upside down or on their side
+    stage.version = 26;  // thermal images by rank
     stage.uses = {"poses_visible"};
     if (asks_for_renders(in.session->session, in.config->poses))
       stage.uses.push_back("train_visible");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
@@ -18,12 +19,14 @@ struct OwnOfFrame {
   std::array<double, 3> gain = {1, 1, 1};  ///< R, G, B against the common exposure
   double offset_k = 0;                     ///< the camera's drift
   double shading_k = 0;                    ///< the lens', of all frames
+  std::optional<nerf::GrayCurve> curve = {};  ///< of a gray thermal frame
 };
 
 /// `camera` may be smaller than `recorded`, the frame's own.
 Result<cv::Mat> image_of(const std::filesystem::path& file, Samples samples, const Camera& recorded,
                          const Camera& camera, const OwnOfFrame& own) {
   ORBITFUSE_ASSIGN(cv::Mat image, field_image(file, samples));
+  if (own.curve) image = nerf::to_common_levels(image, *own.curve);
   if (image.cols != recorded.width || image.rows != recorded.height) return image;  // is told
   if (image.cols != camera.width)
     cv::resize(image, image, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
@@ -68,6 +71,8 @@ Result<nerf::PhotoDetail> recorded_detail(const pipeline::StageContext& context,
     own.shading_k = trained.shading_k;
     if (const auto gain = trained.gains.find(view.name); gain != trained.gains.end())
       own.gain = gain->second;
+    if (const auto curve = trained.gray_curves.find(view.name); curve != trained.gray_curves.end())
+      own.curve = curve->second;
     if (const auto offset = trained.offsets_k.find(view.name); offset != trained.offsets_k.end())
       own.offset_k = offset->second;
     sources.push_back(

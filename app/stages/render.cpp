@@ -275,7 +275,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 8;  // of cameras on their side: upright
+  stage.version = 9;  // gray thermal frames
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   const std::string& cameras = in.config->render.cameras;

@@ -132,10 +132,12 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
     poses.total = input.count(modality);
     if (poses.total == 0) continue;
     const std::string stage = "poses_" + std::string(name(modality));
+    std::size_t doubtful = 0;
     if (const json* m = context.metrics_of(stage)) {
       poses.found = said_of_poses(*m, stage);
       poses.posed = m->value("posed", 0);
       poses.total = m->value("total", poses.total);
+      doubtful = m->value("doubtful", json::array()).size();
       for (const json& attempt : m->value("ladder", json::array()))
         poses.ladder.push_back(
             {attempt.value("attempt", ""), outcome_of(attempt), attempt.value("why", "")});
@@ -143,6 +145,9 @@ void add_poses(const StageContext& context, const SessionInput& input, report::M
     poses.advice = advice(poses);
     model.headline.emplace_back(fmt::format("{} views posed", name(modality)),
                                 fmt::format("{} of {}", poses.posed, poses.total));
+    if (doubtful > 0)
+      model.headline.emplace_back(fmt::format("of these {} views doubtful", name(modality)),
+                                  fmt::format("{}", doubtful));
     model.poses.push_back(std::move(poses));
   }
 }

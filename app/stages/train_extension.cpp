@@ -91,6 +91,7 @@ json metrics_json(const nerf::TrainReport& report) {
           {"samples", report.samples},
           {"samples_per_ray", report.samples_per_ray()},
           {"image_gains", report.image_gains},
+          {"gray_curves", report.gray_curves},
           {"image_offsets_k", report.image_offsets_k},
           {"shading_k", report.shading_k}};
 }

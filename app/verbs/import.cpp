@@ -167,6 +167,13 @@ Status check_alone(const ImportArguments& o) {
   });
 }
 
+/// A folder of its own for each session: "car_out" beside "car/".
+std::string out_beside(const std::string& session) {
+  const std::filesystem::path folder = std::filesystem::path(session).lexically_normal();
+  const std::filesystem::path last = folder.has_filename() ? folder : folder.parent_path();
+  return last.string() + "_out";
+}
+
 Status run(Context& context, ImportArguments& o) {
   ORBITFUSE_TRY(check_alone(o));
   ORBITFUSE_TRY(check_ranges(o));
@@ -187,7 +194,8 @@ Status run(Context& context, ImportArguments& o) {
                                             : " without temperatures",
                   report.tracking, report.with_pose, report.with_station));
   context.console.info(dry ? "nothing was written"
-                           : fmt::format("next: orbitfuse run {} --out out", o.session));
+                           : fmt::format("next: orbitfuse run {} --out {}", o.session,
+                                         out_beside(o.session)));
   context.result = {{"session", o.session},
                     {"visible", report.visible},
                     {"thermal", report.thermal},

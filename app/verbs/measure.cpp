@@ -35,7 +35,12 @@ Result<Session> session_of(const MeasureArguments& options) {
     if (!fs::exists(fs::path(options.out) / "run.json", unreadable))
       return fail(ErrorKind::input, options.out, "no run.json in it",
                   "name the --out folder of a run, or give --session too");
-    ORBITFUSE_TRY(resolve(folders));
+    ORBITFUSE_TRY(resolve(folders).map_error([&](Error error) {
+      std::error_code gone;
+      if (folders.session != options.out && !fs::exists(folders.session, gone))
+        error.remedy = "bring it back, or say where it is now: --session FOLDER";
+      return error;
+    }));
   }
   return open_session(folders.session).map_error([](Error error) {
     error.remedy += "; or say where the session is with --session";

@@ -180,6 +180,10 @@ Status run(const Arguments& arguments) {
   const Reconstruction thermal = turned_back(arguments.turned, poses.reconstruction);
   const PoseError error = scenes::pose_error(
       thermal, poses.shares_visible_frame ? seen.reconstruction : thermal, scene.truth);
+  if (error.views == 0)
+    return fail(ErrorKind::input, arguments.truth.string(),
+                "no posed view of that name, or no similarity to the truth",
+                "nothing can be measured: name the thermal files as the session does");
   fmt::print(
       "centres ATE {:.3f} %, median {:.3f} %, worst {:.3f} % of the extent; rotation mean "
       "{:.3f}, median {:.3f}, worst {:.3f} deg\n",

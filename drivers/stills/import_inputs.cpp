@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <map>
 #include <set>
 
 #include "capture/recording/session_folder.hpp"
@@ -43,6 +45,7 @@ class Gathering {
     ORBITFUSE_TRY(check_object_parameters());
     inputs_.visible = photo_sources(visible);
     inputs_.visible_tracking = photo_sources(visible_tracking);
+    ORBITFUSE_TRY(check_roles());
     take_out_copies(Modality::visible, {&inputs_.visible, &inputs_.visible_tracking});
     take_out_copies(Modality::thermal, {&inputs_.thermal, &inputs_.thermal_tracking});
     for (std::vector<Source>* sources :
@@ -210,6 +213,22 @@ class Gathering {
     for (std::vector<Source>* sources : lists) {
       filter.take_out(*sources, remarks_);
     }
+  }
+
+  /// One folder given twice is no pair of orbits.
+  Status check_roles() const {
+    std::map<std::string, fs::path> photos;
+    for (const Source& photo : inputs_.visible)
+      if (!photo.hash.empty()) photos.emplace(photo.hash, photo.file);
+    const auto is_photo = [&](const Source& source) { return photos.contains(source.hash); };
+    const std::vector<Source>& thermal = inputs_.thermal;
+    if (thermal.empty() || !std::all_of(thermal.begin(), thermal.end(), is_photo)) return {};
+    return fail(ErrorKind::input, thermal.front().file.string(),
+                fmt::format("the same image as {}, and so are all thermal ones: photos are no "
+                            "thermal images",
+                            photos.at(thermal.front().hash).string()),
+                "give the thermal camera's own files with --thermal (photos inside radiometric "
+                "JPEGs come with --embedded-visible)");
   }
 
   /// Only radiometric JPEGs say what was assumed of the object; temperatures of others are as they

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
@@ -58,6 +59,13 @@ double shading_r2(double x, double y, cv::Size size);
 /// What a thermal lens' shading adds to an image of this size, kelvin (CV_32FC1): nothing in its
 /// middle, `falloff_k` half a width beside it, and as the square of the distance.
 cv::Mat shading_image(double falloff_k, cv::Size size);
+
+/// Common levels at a view's own levels 0, 255/8 .. 255, straight between them (GrayCurves).
+using GrayCurve = std::array<double, 9>;
+
+/// A gray thermal view brought to the levels that all views share, as training does; NaN where it
+/// was clipped and other views say more.
+cv::Mat to_common_levels(const cv::Mat& image, const GrayCurve& curve);
 
 /// The view at another size: area-averaged image and matching camera.
 TrainingView resized(const TrainingView& view, int width, int height);

@@ -35,6 +35,9 @@ struct TrainReport : History {
   /// R, G, B of a view against the common exposure, which the field shows (even_exposure); empty:
   /// steady.
   std::map<std::string, std::array<double, 3>> image_gains;
+  /// From a gray thermal view's levels to those that all share, which the field shows; empty: of
+  /// one span already.
+  std::map<std::string, GrayCurve> gray_curves;
   std::map<std::string, Rigid3d>
       refined_poses;   ///< cam_from_world by view, as training left it (refine_poses)
   std::string device;  ///< that made the steps; empty: the processor

@@ -13,7 +13,7 @@ namespace orbitfuse {
 Result<cv::Mat> straight_luminance(const Session& session, const FrameRecord& frame,
                                    const Camera& lens) {
   ORBITFUSE_ASSIGN(const cv::Mat values, read_luminance(session, frame));
-  return recorded_straight(without_glare(values), lens, frame.file);
+  return recorded_straight(equalised(values), lens, frame.file);
 }
 
 Result<SceneRenderer> scene_of(const VisibleScene& visible,

@@ -10,6 +10,7 @@
 #include "recon/poses/known/session_poses.hpp"
 #include "recon/poses/rig/rig_poses.hpp"
 #include "recon/poses/sfm/sfm_ladder.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 
@@ -61,6 +62,16 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
   return ThermalPoses{std::move(poses), false};
 }
 
+/// Who was wrong about the photos' stations was about these.
+bool stations_doubtful(const Session& session, const VisibleScene* visible,
+                       const PoseOptions& options) {
+  if (visible == nullptr || !have_declared_stations(session.frames_of(Modality::visible)) ||
+      !have_declared_stations(session.frames_of(Modality::thermal, false)))
+    return false;
+  const auto fit = fit_stations(visible->reconstruction.views, session);
+  return fit && contradicted(*fit, options);
+}
+
 /// Known poses that nothing confirms and nothing can replace.
 ThermalPoses in_doubt(ModalityPoses known, const std::string& why) {
   for (const PosedView& view : known.reconstruction.views)
@@ -78,8 +89,16 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                                             const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(progress.check("poses.thermal"));
-  if (!options.use_known_poses || !has_known_poses(session, Modality::thermal))
-    return estimated(session, visible, options, workdir, progress, {});
+  if (!options.use_known_poses || !has_known_poses(session, Modality::thermal)) {
+    if (!stations_doubtful(session, visible, options))
+      return estimated(session, visible, options, workdir, progress, {});
+    ORBITFUSE_ASSIGN(ThermalPoses poses, estimated(in_order_alone(session, Modality::thermal),
+                                                   visible, options, workdir, progress, {}));
+    poses.warnings.push_back(
+        "the photos contradict the stations they were declared with: of the thermal frames the "
+        "order alone was used");
+    return poses;
+  }
   ORBITFUSE_ASSIGN(ModalityPoses known, known_poses(session, Modality::thermal));
   // Known poses of a session share one world; estimated visible ones do not live in it.
   const bool shares = visible != nullptr && has_known_poses(session, Modality::visible);

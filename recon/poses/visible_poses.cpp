@@ -3,10 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "core/geometry/level_cameras.hpp"
 #include "recon/poses/estimate/visible_ladder.hpp"
 #include "recon/poses/known/photo_check.hpp"
 #include "recon/poses/known/session_poses.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -29,6 +32,38 @@ void tell_side(ModalityPoses& poses) {
         100 * share));
 }
 
+/// A spacing that was declared wrongly contradicts every model that is right: none is believed, or
+/// most views are missing. Then the photos are posed in the order they were taken in alone, which a
+/// model must keep, and that counts where it is believed.
+Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& options,
+                                     const std::filesystem::path& workdir,
+                                     const Progress& progress, std::vector<LadderStep>& steps) {
+  const auto frames = session.frames_of(Modality::visible, options.use_tracking_frames);
+  if (frames.size() < 2)
+    return fail(ErrorKind::input, session.folder.string(),
+                fmt::format("{} visible frames, at least 2 are needed", frames.size()),
+                "record or import more views");
+  auto poses = pose_visible_views(session, frames, options, workdir / "visible", progress, steps);
+  if (poses || poses.error().kind != ErrorKind::quality || !have_declared_stations(frames))
+    return poses;
+  const Session ordered = in_order_alone(session, Modality::visible);
+  const std::size_t before = steps.size();
+  auto anew = pose_visible_views(
+      ordered, ordered.frames_of(Modality::visible, options.use_tracking_frames), options,
+      workdir / "visible_in_order", progress, steps);
+  if (!anew && anew.error().kind == ErrorKind::cancelled) return anew;
+  for (std::size_t i = before; i < steps.size(); ++i) steps[i].attempt += ", in order alone";
+  if (!anew) {
+    poses.error().remedy += "; are the stations right (--station-spacing-deg, --loops)? Without "
+                            "them, in the order of the photos alone, nothing held either";
+    return poses;
+  }
+  anew->warnings.push_back(
+      "the photos contradict the stations they were declared with: they are posed in their order "
+      "alone; check --station-spacing-deg and --loops, or import without them");
+  return anew;
+}
+
 }  // namespace
 
 Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseOptions& options,
@@ -43,14 +78,8 @@ Result<ModalityPoses> estimate_visible_poses(const Session& session, const PoseO
     tell_side(known);
     return known;
   }
-  const auto frames = session.frames_of(Modality::visible, options.use_tracking_frames);
-  if (frames.size() < 2)
-    return fail(ErrorKind::input, session.folder.string(),
-                fmt::format("{} visible frames, at least 2 are needed", frames.size()),
-                "record or import more views");
   std::vector<LadderStep> steps;
-  ORBITFUSE_ASSIGN(ModalityPoses poses, pose_visible_views(session, frames, options,
-                                                           workdir / "visible", progress, steps));
+  ORBITFUSE_ASSIGN(ModalityPoses poses, pose_by_photos(session, options, workdir, progress, steps));
   poses.ladder = std::move(steps);
   tell_side(poses);
   return poses;

@@ -33,7 +33,24 @@ double robust_offset_deg(const std::vector<double>& differences) {
 
 bool all_have_stations(const std::vector<const FrameRecord*>& frames) {
   return std::all_of(frames.begin(), frames.end(),
-                     [](const FrameRecord* f) { return f->station.has_value(); });
+                     [](const FrameRecord* f) { return tells_azimuth(f->station); });
+}
+
+bool tells_azimuth(const std::optional<Station>& station) {
+  constexpr double anywhere_deg = 90;
+  return station && station->azimuth_sigma_deg.value_or(0) < anywhere_deg;
+}
+
+bool have_declared_stations(const std::vector<const FrameRecord*>& frames) {
+  return !frames.empty() && std::all_of(frames.begin(), frames.end(), [](const FrameRecord* f) {
+    return f->station && !f->station->azimuth_sigma_deg;
+  });
+}
+
+Session in_order_alone(Session session, Modality modality) {
+  for (FrameRecord& frame : session.frames)
+    if (frame.modality == modality && frame.station) frame.station->azimuth_sigma_deg = 180;
+  return session;
 }
 
 OrbitAngles orbit_angles(const Eigen::Vector3d& center) {
@@ -67,7 +84,7 @@ Similarity3d canonical_from_world(const std::vector<PosedView>& views,
         orbit_angles(z_up * (camera_center(views[i].cam_from_world) - origin)).azimuth_deg;
     if (i == 0) first_azimuth = azimuth;
     const auto found = by_name.find(views[i].name);
-    if (found != by_name.end() && found->second->station)
+    if (found != by_name.end() && tells_azimuth(found->second->station))
       offsets.push_back(azimuth - found->second->station->azimuth_deg);
   }
   const double turn = offsets.size() >= 3 ? robust_offset_deg(offsets) : first_azimuth;
@@ -92,7 +109,7 @@ std::optional<StationFit> fit_stations(const std::vector<PosedView>& views,
   std::vector<std::string> names;
   for (const PosedView& view : views) {
     const auto found = by_name.find(view.name);
-    if (found == by_name.end() || !found->second->station) continue;
+    if (found == by_name.end() || !tells_azimuth(found->second->station)) continue;
     const OrbitAngles angles = orbit_angles(canonical * camera_center(view.cam_from_world));
     names.push_back(view.name);
     azimuth.push_back(angles.azimuth_deg);

@@ -16,7 +16,17 @@
 // and cameras mean something in it: z up, the origin where the cameras look, median distance 1.
 namespace orbitfuse {
 
-/// Every frame has a station.
+/// Whether there is a station, and more known of it than its place in the order of the views.
+bool tells_azimuth(const std::optional<Station>& station);
+
+/// All stations were declared with the images, so many degrees apart as somebody said; the guide
+/// measures them.
+bool have_declared_stations(const std::vector<const FrameRecord*>& frames);
+
+/// Stations of that modality tell no azimuth any more.
+Session in_order_alone(Session session, Modality modality);
+
+/// Every frame has a station that tells its azimuth.
 bool all_have_stations(const std::vector<const FrameRecord*>& frames);
 
 /// Azimuth of the first view (or the stations' circular mean offset, where stations exist) becomes

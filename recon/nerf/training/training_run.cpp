@@ -13,6 +13,7 @@
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/rendering/render.hpp"
 #include "recon/nerf/training/exposure.hpp"
+#include "recon/nerf/training/gray_curves.hpp"
 #include "recon/nerf/training/measure.hpp"
 #include "recon/nerf/training/shading.hpp"
 
@@ -79,15 +80,15 @@ bool of_one_lens(const Dataset& data) {
   });
 }
 
-/// What the guide's surfaces are like from the views that train.
+/// What the guide's surfaces are like from the views that are not left out.
 std::vector<DepthMap> depth_from(const FieldState& guide, const Dataset& data,
-                                 const std::vector<bool>& heldout) {
+                                 const std::vector<bool>& left_out) {
   constexpr int width_px = 128;
   RenderOptions coarse;
   coarse.sample_factor = 0.5;
   std::vector<DepthMap> maps;
   for (std::size_t i = 0; i < data.views.size(); ++i) {
-    if (heldout[i]) continue;
+    if (left_out[i]) continue;
     const TrainingView& view = data.views[i];
     DepthMap map;
     map.view = static_cast<int>(i);
@@ -198,6 +199,27 @@ void TrainingRun::even_shading(const Field* guide) {
     view.target -= shading_image(shading.falloff_k * per_kelvin, view.target.size());
 }
 
+void TrainingRun::even_levels(const Field* guide) {
+  const auto skip = [&](std::string why) {
+    report_.skips.push_back({"even levels", std::move(why), "images are used as they are"});
+  };
+  if (!options_.shared_geometry)
+    return skip("no visible field in the same frame says which points views share");
+  const GrayCurves found = estimate_gray_curves(
+      data_.dataset,
+      depth_from(guide->state(), data_.dataset, std::vector<bool>(views_.size(), false)),
+      data_.heldout);
+  if (!found.told())
+    return skip(fmt::format("levels of {} shared places differ by {:.1f} of 255 in the median",
+                            found.points, found.before));
+  const float per_level = static_cast<float>(1 / (state_->span.high - state_->span.low));
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    const TrainingView& view = data_.dataset.views[i];
+    report_.gray_curves[view.name] = found.of_view[i];
+    views_[i].target = (to_common_levels(view.image, found.of_view[i]) - state_->span.low) * per_level;
+  }
+}
+
 void TrainingRun::show_background() {
   if (!background_) return;
   auto clearance_px = background_->clearance_px.begin();
@@ -216,6 +238,7 @@ Status TrainingRun::prepare(const Field* guide) {
   ORBITFUSE_TRY(start_geometry(guide));
   prepare_views_of_run();
   if (options_.even_shading && dataset_has_kelvin(data_.dataset)) even_shading(guide);
+  if (options_.even_exposure && data_.dataset.thermal_is_gray) even_levels(guide);
   try {
     trainer_.emplace(*state_, views_, data_.heldout);
     if (trainer_->on_device()) report_.device = device::current()->name();

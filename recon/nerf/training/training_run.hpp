@@ -65,6 +65,7 @@ class TrainingRun {
   Status start_geometry(const Field* guide);
   void prepare_views_of_run();
   void even_shading(const Field* guide);
+  void even_levels(const Field* guide);
   void show_background();  ///< to the views that train
 
   double fraction() const;  ///< place in the schedule

@@ -10,6 +10,7 @@
 #include "core/numeric/angle_units.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/poses/index.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -118,7 +119,7 @@ std::vector<std::optional<Eigen::Quaterniond>> nominal_rotations(
   std::vector<std::optional<Eigen::Quaterniond>> result;
   for (const FrameRecord* frame : frames) {
     result.emplace_back();
-    if (!frame->station) continue;
+    if (!tells_azimuth(frame->station)) continue;
     const double azimuth = (clockwise ? -1 : 1) * frame->station->azimuth_deg * radians_per_degree;
     const double elevation = elevations_deg[at(frame->station->loop)] * radians_per_degree;
     const Eigen::Vector3d forward(-std::cos(elevation) * std::cos(azimuth),
@@ -149,7 +150,7 @@ std::vector<double> loop_elevations_deg(const std::vector<const FrameRecord*>& f
     for (const auto& of_pair : candidates)
       for (const RelativePose& pose : of_pair) {
         const auto &a = frames[at(pose.first)]->station, &b = frames[at(pose.second)]->station;
-        if (!a || !b || a->loop != loop || b->loop != loop) continue;
+        if (!tells_azimuth(a) || !tells_azimuth(b) || a->loop != loop || b->loop != loop) continue;
         Eigen::Vector3d turn = log_of(pose.second_from_first.rotation);
         const double expected =
             std::abs(std::remainder(a->azimuth_deg - b->azimuth_deg, 360.0)) * radians_per_degree;

@@ -225,6 +225,13 @@ tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality m
                   : "record visible views of the same object too, or import known poses");
 }
 
+bool contradicted(const StationFit& fit, const PoseOptions& options) {
+  // Chord of the median residual, in radii.
+  const double residual = 2 * std::sin(fit.median_residual_deg / 2 * std::numbers::pi / 180.0);
+  return !(residual <= options.max_station_residual &&
+           fit.outliers <= max_contradicting * fit.views);
+}
+
 bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOptions& options,
                   std::string& why) {
   const auto posed = static_cast<int>(poses.reconstruction.views.size());
@@ -245,15 +252,12 @@ bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOption
   }
 
   if (const auto fit = fit_stations(poses.reconstruction.views, session)) {
-    // Chord of the median residual, in radii.
-    const double residual = 2 * std::sin(fit->median_residual_deg / 2 * std::numbers::pi / 180.0);
-    const double outliers = static_cast<double>(fit->outliers) / fit->views;
     poses.gates["station_residual_deg"] = fit->median_residual_deg;
-    poses.gates["station_outlier_ratio"] = outliers;
+    poses.gates["station_outlier_ratio"] = static_cast<double>(fit->outliers) / fit->views;
     why += fmt::format(", {:.1f} deg from the stations in the median, {} of {} contradict them{}",
                        fit->median_residual_deg, fit->outliers, fit->views,
                        fit->mirrored ? " (which run the other way round)" : "");
-    if (!(residual <= options.max_station_residual && outliers <= max_contradicting)) {
+    if (contradicted(*fit, options)) {
       why += fmt::format(
           " (believed are {:.0f} % of the radius, poses.max_station_residual, and "
           "{:.0f} % of the views)",

@@ -3,6 +3,7 @@
 
 #include "recon/poses/estimate_poses.hpp"
 #include "recon/poses/sfm/bundle_adjustment.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 
@@ -45,6 +46,9 @@ constexpr const char* attempts_file = "attempts.txt";
 /// them are listed in `attempts_file`. `steps`: at least one.
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality,
                                 const std::filesystem::path& workdir);
+
+/// More views lie beside their stations, or farther from them, than is believed.
+bool contradicted(const StationFit& fit, const PoseOptions& options);
 
 /// The gates a model must pass without ground truth; `why` says the figures either way.
 /// Fills poses.gates.

@@ -2,6 +2,7 @@
 #include "drivers/stills/import.hpp"
 
 #include <gmock/gmock.h>
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -80,6 +81,19 @@ std::vector<std::vector<double>> celsius_table(const fs::path& file) {
         rows.back().push_back(std::stod(cell));
   }
   return rows;
+}
+
+TEST_F(ImportTest, OneFolderIsNoPairOfOrbits) {
+  for (const int i : {0, 1, 2})
+    put_photo(fmt::format("in/{}.jpg", i), static_cast<std::uint64_t>(i));
+  options.visible = options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().kind, ErrorKind::input);
+  EXPECT_NE(report.error().found.find("the same image as"), std::string::npos);
+  put_photo("other/own.jpg", 9);
+  options.thermal = {folder / "in", folder / "other"};
+  EXPECT_TRUE(import()) << "some files in both are only odd";
 }
 
 TEST_F(ImportTest, PhotosOfSeveralLensesAndSizesAreKeptApartAndNamed) {

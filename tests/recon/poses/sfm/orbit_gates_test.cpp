@@ -96,6 +96,39 @@ TEST(OrbitGates, FrontMergedWithBackIsRefusedByStationsOfUnknownOrigin) {
   EXPECT_GE(fit->outliers, 15) << "an unknown origin says nothing against differences";
 }
 
+/// Declared 15 degrees apart where they were taken 10 apart.
+TEST(OrbitGates, OfStationsDeclaredWronglyTheOrderIsLeft) {
+  Session session = tracking_session(36);
+  for (std::size_t i = 0; i < session.frames.size(); ++i) {
+    FrameRecord& frame = session.frames[i];
+    frame.tracking = false;
+    Station station;
+    station.index = static_cast<int>(i);
+    station.azimuth_deg = 15.0 * static_cast<double>(i);
+    station.azimuth_sigma_deg.reset();
+    frame.station = station;
+  }
+  const auto frames = session.frames_of(Modality::thermal);
+  EXPECT_TRUE(have_declared_stations(frames));
+  EXPECT_TRUE(all_have_stations(frames));
+  const ModalityPoses right = poses_with(session, as_taken);
+  EXPECT_FALSE(believed(right, session));
+  const auto fit = fit_stations(right.reconstruction.views, session);
+  ASSERT_TRUE(fit);
+  EXPECT_TRUE(contradicted(*fit, {}));
+
+  const Session ordered = in_order_alone(session, Modality::thermal);
+  EXPECT_FALSE(have_declared_stations(ordered.frames_of(Modality::thermal)));
+  EXPECT_FALSE(all_have_stations(ordered.frames_of(Modality::thermal)));
+  EXPECT_FALSE(fit_stations(right.reconstruction.views, ordered));
+  EXPECT_TRUE(believed(right, ordered));
+  EXPECT_FALSE(believed(poses_with(ordered, front_on_back), ordered));
+  EXPECT_FALSE(believed(poses_with(ordered, mirrored_back), ordered));
+  EXPECT_TRUE(all_have_stations(in_order_alone(session, Modality::visible)
+                                    .frames_of(Modality::thermal)))
+      << "the other modality keeps its own";
+}
+
 TEST(OrbitGates, APartOfTheFramesIsNotEnough) {
   // 45 of 72, as measured: a right model of so few would be refused as well.
   const Session session = tracking_session(72);
