@@ -245,10 +245,9 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
     if (!visible.empty() && !view.visible.empty())
       ORBITFUSE_TRY(compare_visible(visible, view, camera, cam_from_visible, progress, sums));
     if (!thermal.empty() && !view.thermal.empty())
-      ORBITFUSE_TRY(compare_thermal(thermal, view, camera,
-                                    rebase(cam_from_visible, run.visible_from_thermal.inverse()),
-                                    stages::samples_of(session, Modality::thermal), options,
-                                    progress, sums));
+      ORBITFUSE_TRY(compare_thermal(
+          thermal, view, camera, rebase(cam_from_visible, run.visible_from_thermal.inverse()),
+          stages::samples_of(session, Modality::thermal), options, progress, sums));
   }
   json result = {{"views", truth.test.size()}};
   if (sums.visible > 0) {

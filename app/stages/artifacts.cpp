@@ -169,7 +169,7 @@ Result<TrainedFrames> load_trained_frames(const fs::path& folder) {
   ORBITFUSE_TRY(metrics.get_present("heldout_psnr_db", frames.heldout_psnr_db));
   if (metrics.has("shading_k"))
     ORBITFUSE_TRY(metrics.get("shading_k", frames.shading_k));  // 2026-11
-  if (metrics.has("gray_curves")) {  // 2026-11-28
+  if (metrics.has("gray_curves")) {                             // 2026-11-28
     ORBITFUSE_ASSIGN(const JsonFields curves, metrics.child("gray_curves"));
     for (const std::string& view : curves.keys())
       ORBITFUSE_TRY(curves.get(view.c_str(), frames.gray_curves[view]));

@@ -69,7 +69,7 @@ struct TrainedFrames {
   /// R, G, B of a frame against the common exposure; of the others it was steady.
   std::map<std::string, std::array<double, 3>> gains;
   std::map<std::string, double> offsets_k;  ///< the camera's drift in a frame; of the others none
-  double shading_k = 0;              ///< nerf::shading_image(): in every frame, not in the field
+  double shading_k = 0;  ///< nerf::shading_image(): in every frame, not in the field
   /// From a gray thermal frame's levels to the field's; empty: they are.
   std::map<std::string, nerf::GrayCurve> gray_curves;
   std::vector<std::string> heldout;  ///< that the field did not learn from

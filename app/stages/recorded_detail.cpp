@@ -16,9 +16,9 @@ namespace {
 
 /// What training found of one frame, and its field is without.
 struct OwnOfFrame {
-  std::array<double, 3> gain = {1, 1, 1};  ///< R, G, B against the common exposure
-  double offset_k = 0;                     ///< the camera's drift
-  double shading_k = 0;                    ///< the lens', of all frames
+  std::array<double, 3> gain = {1, 1, 1};     ///< R, G, B against the common exposure
+  double offset_k = 0;                        ///< the camera's drift
+  double shading_k = 0;                       ///< the lens', of all frames
   std::optional<nerf::GrayCurve> curve = {};  ///< of a gray thermal frame
 };
 

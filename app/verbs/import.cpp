@@ -193,9 +193,9 @@ Status run(Context& context, ImportArguments& o) {
                   : report.has_temperatures ? " with temperatures"
                                             : " without temperatures",
                   report.tracking, report.with_pose, report.with_station));
-  context.console.info(dry ? "nothing was written"
-                           : fmt::format("next: orbitfuse run {} --out {}", o.session,
-                                         out_beside(o.session)));
+  context.console.info(
+      dry ? "nothing was written"
+          : fmt::format("next: orbitfuse run {} --out {}", o.session, out_beside(o.session)));
   context.result = {{"session", o.session},
                     {"visible", report.visible},
                     {"thermal", report.thermal},

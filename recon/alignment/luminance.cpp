@@ -98,7 +98,8 @@ cv::Mat equalised(const cv::Mat& values) {
   std::sort(samples.begin(), samples.end());
   const double noise = std::max(noise_of(values), 0.3 * smallest_step(samples));
   const Curve by_rank = rank_curve(samples, steps, most_of_noise / noise);
-  const float low = samples[samples.size() / 50], high = samples[samples.size() - 1 - samples.size() / 50];
+  const float low = samples[samples.size() / 50],
+              high = samples[samples.size() - 1 - samples.size() / 50];
   cv::Mat ranks = values.clone();
   for (float& v : cv::Mat_<float>(ranks)) {
     if (!std::isfinite(v)) continue;

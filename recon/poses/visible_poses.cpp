@@ -36,8 +36,8 @@ void tell_side(ModalityPoses& poses) {
 /// most views are missing. Then the photos are posed in the order they were taken in alone, which a
 /// model must keep, and that counts where it is believed.
 Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& options,
-                                     const std::filesystem::path& workdir,
-                                     const Progress& progress, std::vector<LadderStep>& steps) {
+                                     const std::filesystem::path& workdir, const Progress& progress,
+                                     std::vector<LadderStep>& steps) {
   const auto frames = session.frames_of(Modality::visible, options.use_tracking_frames);
   if (frames.size() < 2)
     return fail(ErrorKind::input, session.folder.string(),
@@ -48,14 +48,15 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
     return poses;
   const Session ordered = in_order_alone(session, Modality::visible);
   const std::size_t before = steps.size();
-  auto anew = pose_visible_views(
-      ordered, ordered.frames_of(Modality::visible, options.use_tracking_frames), options,
-      workdir / "visible_in_order", progress, steps);
+  auto anew =
+      pose_visible_views(ordered, ordered.frames_of(Modality::visible, options.use_tracking_frames),
+                         options, workdir / "visible_in_order", progress, steps);
   if (!anew && anew.error().kind == ErrorKind::cancelled) return anew;
   for (std::size_t i = before; i < steps.size(); ++i) steps[i].attempt += ", in order alone";
   if (!anew) {
-    poses.error().remedy += "; are the stations right (--station-spacing-deg, --loops)? Without "
-                            "them, in the order of the photos alone, nothing held either";
+    poses.error().remedy +=
+        "; are the stations right (--station-spacing-deg, --loops)? Without "
+        "them, in the order of the photos alone, nothing held either";
     return poses;
   }
   anew->warnings.push_back(

@@ -160,8 +160,7 @@ class CurveFit {
   /// Curves of views that train are the identity in their mean.
   void add_mean(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
     constexpr double mean = 1e3;
-    const auto views =
-        static_cast<double>(std::count(heldout_.begin(), heldout_.end(), false));
+    const auto views = static_cast<double>(std::count(heldout_.begin(), heldout_.end(), false));
     for (std::size_t v = 0; v < curves_.size(); ++v)
       for (std::size_t k = 0; k < knots && !heldout_[v]; ++k) {
         const auto i = static_cast<Eigen::Index>(v * knots + k);
@@ -214,8 +213,10 @@ class CurveFit {
         for (const LevelSample& o : sight) {
           const double both = (&s == &o ? s.weight : 0) - s.weight * o.weight / total;
           const Between a = between(s.level), b = between(o.level);
-          const auto i = static_cast<Eigen::Index>(static_cast<std::size_t>(s.view) * knots + a.knot),
-                     j = static_cast<Eigen::Index>(static_cast<std::size_t>(o.view) * knots + b.knot);
+          const auto i = static_cast<Eigen::Index>(static_cast<std::size_t>(s.view) * knots +
+                                                   a.knot),
+                     j = static_cast<Eigen::Index>(static_cast<std::size_t>(o.view) * knots +
+                                                   b.knot);
           const Eigen::Vector2d of_s(1 - a.above, a.above), of_o(1 - b.above, b.above);
           normal.block<2, 2>(i, j) += both * of_s * of_o.transpose();
         }

@@ -216,7 +216,8 @@ void TrainingRun::even_levels(const Field* guide) {
   for (std::size_t i = 0; i < views_.size(); ++i) {
     const TrainingView& view = data_.dataset.views[i];
     report_.gray_curves[view.name] = found.of_view[i];
-    views_[i].target = (to_common_levels(view.image, found.of_view[i]) - state_->span.low) * per_level;
+    views_[i].target =
+        (to_common_levels(view.image, found.of_view[i]) - state_->span.low) * per_level;
   }
 }
 

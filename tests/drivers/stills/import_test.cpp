@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "drivers/stills/import.hpp"
 
-#include <gmock/gmock.h>
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -85,13 +85,13 @@ std::vector<std::vector<double>> celsius_table(const fs::path& file) {
 
 TEST_F(ImportTest, OneFolderIsNoPairOfOrbits) {
   for (const int i : {0, 1, 2})
-    put_photo(fmt::format("in/{}.jpg", i), static_cast<std::uint64_t>(i));
+    put_photo(fmt::format("in/{}.jpg", i));
   options.visible = options.thermal = {folder / "in"};
   const auto report = import();
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().kind, ErrorKind::input);
   EXPECT_NE(report.error().found.find("the same image as"), std::string::npos);
-  put_photo("other/own.jpg", 9);
+  put_photo("other/own.jpg");
   options.thermal = {folder / "in", folder / "other"};
   EXPECT_TRUE(import()) << "some files in both are only odd";
 }

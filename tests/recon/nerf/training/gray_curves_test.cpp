@@ -56,8 +56,8 @@ double disagreement(const Dataset& data, const GrayCurves* curves) {
   if (curves != nullptr)
     for (std::size_t i = 0; i < data.views.size(); ++i)
       common.views[i].image = to_common_levels(data.views[i].image, curves->of_view[i]);
-  const GrayCurves again = estimate_gray_curves(common, depth,
-                                                std::vector<bool>(data.views.size(), false));
+  const GrayCurves again =
+      estimate_gray_curves(common, depth, std::vector<bool>(data.views.size(), false));
   return again.before;
 }
 
@@ -100,7 +100,7 @@ TEST(GrayCurves, HeldOutViewsFollowAndHaveNoSay) {
   const GrayCurves other = curves_of(spoilt, heldout);
   ASSERT_TRUE(found.told() && other.told());
   for (std::size_t i = 0; i < data.views.size(); ++i)
-    if (!heldout[i]) EXPECT_EQ(found.of_view[i], other.of_view[i]);
+    EXPECT_TRUE(heldout[i] || found.of_view[i] == other.of_view[i]) << i;
   EXPECT_LT(disagreement(data, &found), 0.45 * disagreement(data, nullptr));
 }
 

@@ -124,8 +124,8 @@ TEST(OrbitGates, OfStationsDeclaredWronglyTheOrderIsLeft) {
   EXPECT_TRUE(believed(right, ordered));
   EXPECT_FALSE(believed(poses_with(ordered, front_on_back), ordered));
   EXPECT_FALSE(believed(poses_with(ordered, mirrored_back), ordered));
-  EXPECT_TRUE(all_have_stations(in_order_alone(session, Modality::visible)
-                                    .frames_of(Modality::thermal)))
+  EXPECT_TRUE(
+      all_have_stations(in_order_alone(session, Modality::visible).frames_of(Modality::thermal)))
       << "the other modality keeps its own";
 }
 
