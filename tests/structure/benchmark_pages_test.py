@@ -15,6 +15,7 @@ WITHOUT_PLOT = {
     "cuda.md": "two machines side by side, six rows",
     "fuzzing.md": "runs of a fuzzer measure how fast a parser is",
     "hostile.md": "says what the program answers",
+    "input/gray.md": "a few scenes, two figures each",
     "input/known_poses.md": "mistakes that are seen or not",
     "input/mirrored.md": "refused or not",
     "input/turned.md": "placed or not",
