@@ -78,7 +78,8 @@ struct TrainOptions {
   double level_anneal_end = 0;    ///< fraction of the run by which the finest level is on; 0 = off
   bool per_image_offset = false;  ///< thermal drift: one offset per frame, mean zero
   /// Visible views of a camera on automatic are brought to one exposure first, where points that
-  /// several see say that it varied (exposure.hpp).
+  /// several see say that it varied (exposure.hpp), and gray thermal ones to one scale of levels
+  /// (gray_curves.hpp).
   bool even_exposure = true;
   /// Thermal views are freed of what their lens takes from the sides first, where a guide's
   /// geometry says that they see the same points and these tell it (shading.hpp).
