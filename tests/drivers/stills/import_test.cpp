@@ -84,8 +84,7 @@ std::vector<std::vector<double>> celsius_table(const fs::path& file) {
 }
 
 TEST_F(ImportTest, OneFolderIsNoPairOfOrbits) {
-  for (const int i : {0, 1, 2})
-    put_photo(fmt::format("in/{}.jpg", i));
+  for (const int i : {0, 1, 2}) put_photo(fmt::format("in/{}.jpg", i));
   options.visible = options.thermal = {folder / "in"};
   const auto report = import();
   ASSERT_FALSE(report);
