@@ -63,8 +63,7 @@ cv::Mat shading_image(double falloff_k, cv::Size size);
 /// Common levels at a view's own levels 0, 255/8 .. 255, straight between them (GrayCurves).
 using GrayCurve = std::array<double, 9>;
 
-/// A gray thermal view brought to the levels that all views share, as training does; NaN where it
-/// was clipped and other views say more.
+/// A gray thermal view brought to the levels that all views share, as training does; NaN stays NaN.
 cv::Mat to_common_levels(const cv::Mat& image, const GrayCurve& curve);
 
 /// The view at another size: area-averaged image and matching camera.

@@ -65,7 +65,7 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
 /// Who was wrong about the photos' stations was about these.
 bool stations_doubtful(const Session& session, const VisibleScene* visible,
                        const PoseOptions& options) {
-  if (visible == nullptr || !have_declared_stations(session.frames_of(Modality::visible)) ||
+  if (visible == nullptr || !have_declared_stations(session.frames_of(Modality::visible, false)) ||
       !have_declared_stations(session.frames_of(Modality::thermal, false)))
     return false;
   const auto fit = fit_stations(visible->reconstruction.views, session);

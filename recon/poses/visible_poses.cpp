@@ -9,6 +9,7 @@
 #include "recon/poses/estimate/visible_ladder.hpp"
 #include "recon/poses/known/photo_check.hpp"
 #include "recon/poses/known/session_poses.hpp"
+#include "recon/poses/sfm/sfm_ladder.hpp"
 #include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
@@ -53,12 +54,17 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
                          options, workdir / "visible_in_order", progress, steps);
   if (!anew && anew.error().kind == ErrorKind::cancelled) return anew;
   for (std::size_t i = before; i < steps.size(); ++i) steps[i].attempt += ", in order alone";
-  if (!anew) {
+  // Another spacing than the declared one, not views folded onto another side.
+  if (!anew || !evenly_spaced(anew->reconstruction.views, ordered, max_contradicting)) {
+    for (std::size_t i = before; i < steps.size(); ++i) steps[i].held = false;
     poses.error().remedy +=
         "; are the stations right (--station-spacing-deg, --loops)? Without "
         "them, in the order of the photos alone, nothing held either";
     return poses;
   }
+  if (const auto fit = fit_stations(anew->reconstruction.views, session);
+      !fit || !contradicted(*fit, options))
+    return anew;
   anew->warnings.push_back(
       "the photos contradict the stations they were declared with: they are posed in their order "
       "alone; check --station-spacing-deg and --loops, or import without them");

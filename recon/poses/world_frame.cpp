@@ -142,6 +142,39 @@ std::optional<StationFit> fit_stations(const std::vector<PosedView>& views,
   return best;
 }
 
+bool evenly_spaced(const std::vector<PosedView>& views, const Session& session,
+                   double most_astray) {
+  constexpr double astray_deg = 20, off_deg = 6, step_deg = 0.1;
+  std::map<std::string, const FrameRecord*> by_name;
+  for (const FrameRecord& frame : session.frames) by_name[frame.file] = &frame;
+  const Similarity3d canonical = canonical_from_world(views, {});
+  std::vector<double> azimuth, place;
+  for (const PosedView& view : views) {
+    const auto found = by_name.find(view.name);
+    if (found == by_name.end() || found->second->tracking) continue;
+    azimuth.push_back(orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg);
+    place.push_back(static_cast<double>(found->second->sequence));
+  }
+  if (azimuth.size() < 3) return false;
+  std::vector<double> rates;
+  for (std::size_t i = 1; i < azimuth.size(); ++i)
+    if (place[i] > place[i - 1])
+      rates.push_back(wrapped_deg(azimuth[i] - azimuth[i - 1]) / (place[i] - place[i - 1]));
+  const double usual = median(rates);
+  // A degree of it is most of a step after a walk of two loops: the best of those near by counts.
+  std::ptrdiff_t fewest = std::ssize(azimuth);
+  for (double spacing = usual - off_deg; spacing <= usual + off_deg; spacing += step_deg) {
+    std::vector<double> difference;
+    for (std::size_t i = 0; i < azimuth.size(); ++i)
+      difference.push_back(azimuth[i] - spacing * place[i]);
+    const double offset = robust_offset_deg(difference);
+    fewest = std::min(fewest, std::count_if(difference.begin(), difference.end(), [&](double d) {
+                        return std::abs(wrapped_deg(d - offset)) > astray_deg;
+                      }));
+  }
+  return static_cast<double>(fewest) <= most_astray * static_cast<double>(azimuth.size());
+}
+
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session) {
   std::map<std::string, OrbitAngles> posed;
   const Similarity3d canonical = canonical_from_world(views, {});

@@ -75,4 +75,9 @@ struct CaptureOrder {
 /// Only stations and tracking frames have an order that means something; steps = 0 for others.
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session);
 
+/// Whether the views stand evenly round the orbit in the order they were recorded in, so many
+/// degrees apart whatever their stations say: all but `most_astray` of them within 20 degrees of
+/// that. Of a model that merged front and back half the views are astray. False for fewer than 3.
+bool evenly_spaced(const std::vector<PosedView>& views, const Session& session, double most_astray);
+
 }  // namespace orbitfuse

@@ -21,9 +21,6 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-/// Share of the views that may contradict their stations; beyond, the model is refused as a whole.
-constexpr double max_contradicting = 0.15;
-
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }

@@ -47,6 +47,9 @@ constexpr const char* attempts_file = "attempts.txt";
 tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality modality,
                                 const std::filesystem::path& workdir);
 
+/// Share of the views that may contradict their stations; beyond, the model is refused as a whole.
+inline constexpr double max_contradicting = 0.15;
+
 /// More views lie beside their stations, or farther from them, than is believed.
 bool contradicted(const StationFit& fit, const PoseOptions& options);
 

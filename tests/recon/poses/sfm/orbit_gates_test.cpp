@@ -129,6 +129,33 @@ TEST(OrbitGates, OfStationsDeclaredWronglyTheOrderIsLeft) {
       << "the other modality keeps its own";
 }
 
+/// Two loops of 12 stations leap twice where front and back merge, which the order alone lets pass.
+TEST(OrbitGates, AnotherSpacingIsEvenAndAFoldIsNot) {
+  Session session = tracking_session(24);
+  for (FrameRecord& frame : session.frames) {
+    frame.tracking = false;
+    frame.station.emplace();
+  }
+  const auto even = [&](const auto& azimuth_of) {
+    ModalityPoses poses;
+    for (std::size_t i = 0; i < session.frames.size(); ++i) {
+      OrbitPose pose;
+      pose.azimuth_deg = azimuth_of(30.0 * static_cast<double>(i % 12));
+      pose.elevation_deg = i < 12 ? 10 : 32;
+      pose.radius = 4;
+      const Camera camera = testing_orbit::camera(1400);
+      poses.reconstruction.views.push_back(
+          {session.frames[i].file, camera, cam_from_world_of(pose, camera)});
+    }
+    return evenly_spaced(poses.reconstruction.views, session, max_contradicting);
+  };
+  EXPECT_TRUE(even(as_taken));
+  EXPECT_TRUE(even([](double a) { return -as_taken(a); })) << "walked the other way";
+  EXPECT_FALSE(even(front_on_back));
+  EXPECT_FALSE(even(mirrored_back));
+  EXPECT_FALSE(even([](double a) { return std::fmod(a, 90); }));
+}
+
 TEST(OrbitGates, APartOfTheFramesIsNotEnough) {
   // 45 of 72, as measured: a right model of so few would be refused as well.
   const Session session = tracking_session(72);
