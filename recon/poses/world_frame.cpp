@@ -148,18 +148,19 @@ bool evenly_spaced(const std::vector<PosedView>& views, const Session& session,
   std::map<std::string, const FrameRecord*> by_name;
   for (const FrameRecord& frame : session.frames) by_name[frame.file] = &frame;
   const Similarity3d canonical = canonical_from_world(views, {});
+  std::map<std::uint64_t, double> azimuth_at;  // in the order they were recorded in
+  for (const PosedView& view : views)
+    if (const auto found = by_name.find(view.name);
+        found != by_name.end() && !found->second->tracking)
+      azimuth_at[found->second->sequence] =
+          orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg;
   std::vector<double> azimuth, place;
-  for (const PosedView& view : views) {
-    const auto found = by_name.find(view.name);
-    if (found == by_name.end() || found->second->tracking) continue;
-    azimuth.push_back(orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg);
-    place.push_back(static_cast<double>(found->second->sequence));
-  }
+  for (const auto& [sequence, deg] : azimuth_at)
+    azimuth.push_back(deg), place.push_back(static_cast<double>(sequence));
   if (azimuth.size() < 3) return false;
   std::vector<double> rates;
   for (std::size_t i = 1; i < azimuth.size(); ++i)
-    if (place[i] > place[i - 1])
-      rates.push_back(wrapped_deg(azimuth[i] - azimuth[i - 1]) / (place[i] - place[i - 1]));
+    rates.push_back(wrapped_deg(azimuth[i] - azimuth[i - 1]) / (place[i] - place[i - 1]));
   const double usual = median(rates);
   // A degree of it is most of a step after a walk of two loops: the best of those near by counts.
   std::ptrdiff_t fewest = std::ssize(azimuth);
