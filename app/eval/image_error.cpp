@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "core/numeric/median.hpp"
+#include "core/numeric/rank_correlation.hpp"
 
 namespace orbitfuse::eval {
 
@@ -56,45 +57,17 @@ void LevelPairs::add(const cv::Mat& levels, const cv::Mat& truth_k, double scene
     }
 }
 
-namespace {
-
-std::vector<std::size_t> order_of(const std::vector<float>& values) {
-  std::vector<std::size_t> order(values.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
-  return order;
-}
-
-/// Equal values share their mean rank.
-std::vector<double> ranks_of(const std::vector<float>& values) {
-  const std::vector<std::size_t> order = order_of(values);
-  std::vector<double> ranks(values.size());
-  for (std::size_t i = 0; i < order.size();) {
-    std::size_t end = i;
-    while (end < order.size() && values[order[end]] == values[order[i]]) ++end;
-    for (std::size_t k = i; k < end; ++k) ranks[order[k]] = 0.5 * static_cast<double>(i + end - 1);
-    i = end;
-  }
-  return ranks;
-}
-
-}  // namespace
-
 LevelError level_error(const LevelPairs& pairs) {
   constexpr std::size_t groups = 256;
   const double nothing = std::nan("");
   if (pairs.level.empty()) return {nothing, nothing};
-  const std::vector<double> a = ranks_of(pairs.level), b = ranks_of(pairs.kelvin);
-  const double middle = 0.5 * static_cast<double>(a.size() - 1);
-  double both = 0, of_a = 0, of_b = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    both += (a[i] - middle) * (b[i] - middle);
-    of_a += (a[i] - middle) * (a[i] - middle);
-    of_b += (b[i] - middle) * (b[i] - middle);
-  }
-  if (!(of_a > 0)) return {nothing, nothing};
-  const std::vector<std::size_t> order = order_of(pairs.level);
+  const double correlation = rank_correlation(pairs.level, pairs.kelvin);
+  const auto [darkest, brightest] = std::minmax_element(pairs.level.begin(), pairs.level.end());
+  if (!(*darkest < *brightest)) return {nothing, nothing};
+  std::vector<std::size_t> order(pairs.level.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return pairs.level[a] < pairs.level[b]; });
   double off = 0;
   for (std::size_t g = 0; g < groups; ++g) {
     std::vector<double> kelvin;
@@ -103,8 +76,7 @@ LevelError level_error(const LevelPairs& pairs) {
     const double usual = median(kelvin);
     for (const double k : kelvin) off += std::abs(k - usual);
   }
-  return {of_b > 0 ? both / std::sqrt(of_a * of_b) : nothing,
-          off / static_cast<double>(order.size())};
+  return {correlation, off / static_cast<double>(order.size())};
 }
 
 }  // namespace orbitfuse::eval

@@ -8,7 +8,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <opencv2/imgproc.hpp>
 
 #include "app/stages/artifacts.hpp"
@@ -17,41 +16,13 @@
 #include "core/formats/transforms_json.hpp"
 #include "core/image/image_io.hpp"
 #include "core/numeric/median.hpp"
+#include "core/numeric/rank_correlation.hpp"
 #include "core/temperature.hpp"
 #include "recon/assembly/looked_at.hpp"
 
 namespace orbitfuse {
 namespace {
 namespace fs = std::filesystem;
-
-/// Ranks from 0; equal values share the middle of theirs.
-std::vector<double> ranks(const std::vector<float>& values) {
-  std::vector<std::size_t> order(values.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
-  std::vector<double> result(values.size());
-  for (std::size_t begin = 0; begin < order.size();) {
-    std::size_t end = begin + 1;
-    while (end < order.size() && values[order[end]] == values[order[begin]]) ++end;
-    const double middle = 0.5 * static_cast<double>(begin + end - 1);
-    for (; begin < end; ++begin) result[order[begin]] = middle;
-  }
-  return result;
-}
-
-/// Spearman's; NaN where one of both is the same everywhere.
-double rank_correlation(const std::vector<float>& a, const std::vector<float>& b) {
-  const std::vector<double> x = ranks(a), y = ranks(b);
-  const double mean = 0.5 * (static_cast<double>(x.size()) - 1);
-  double xx = 0, yy = 0, xy = 0;
-  for (std::size_t i = 0; i < x.size(); ++i) {
-    xx += (x[i] - mean) * (x[i] - mean);
-    yy += (y[i] - mean) * (y[i] - mean);
-    xy += (x[i] - mean) * (y[i] - mean);
-  }
-  return xy / std::sqrt(xx * yy);
-}
 
 /// How far each pixel's colour moved, in CIELAB.
 cv::Mat color_strength(const cv::Mat& visible, const cv::Mat& heat) {

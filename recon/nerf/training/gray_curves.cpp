@@ -11,6 +11,7 @@
 #include "core/geometry/lifted.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/nerf/training/confirms.hpp"
+#include "recon/nerf/training/even_sample.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -31,17 +32,10 @@ struct LevelSample {
 };
 using LevelSight = std::vector<LevelSample>;
 
-/// Mean of 3x3 pixels; none outside the image, on edges and where the camera clipped.
+/// None where the camera clipped, either.
 std::optional<double> level_at(const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  const int x = static_cast<int>(std::floor(pixel.x())),
-            y = static_cast<int>(std::floor(pixel.y()));
-  if (x < 2 || y < 2 || x + 2 >= image.cols || y + 2 >= image.rows) return std::nullopt;
-  double low = 0, high = 0;
-  const cv::Mat around = image(cv::Rect(x - 2, y - 2, 5, 5));
-  cv::minMaxLoc(around, &low, &high);
-  const double mean = cv::mean(around(cv::Rect(1, 1, 3, 3)))[0];
-  if (!(high - low < gray_edge) || !(mean > least_gray && mean < most_gray)) return std::nullopt;
-  return mean;
+  const auto level = even_sample(image, pixel, gray_edge);
+  return level && *level > least_gray && *level < most_gray ? level : std::nullopt;
 }
 
 /// Where views that train see a point of one of their maps, and what of it views held out see.

@@ -130,6 +130,12 @@ ValueSpan estimate_span(const Dataset& training) {
   return {low, std::max(high, low + 1.0)};
 }
 
+cv::Mat normalised(const cv::Mat& image, ValueSpan span) {
+  cv::Mat target;
+  image.convertTo(target, -1, 1.0 / (span.high - span.low), -span.low / (span.high - span.low));
+  return target;
+}
+
 std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space,
                                           ValueSpan span) {
   std::vector<NormalisedView> out(dataset.views.size());
@@ -138,8 +144,7 @@ std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& s
     NormalisedView& scene = out[static_cast<std::size_t>(i)];
     scene.name = view.name;
     scene.rays = ViewRays(view.camera, view.cam_from_world, space);
-    view.image.convertTo(scene.target, -1, 1.0 / (span.high - span.low),
-                         -span.low / (span.high - span.low));
+    scene.target = normalised(view.image, span);
     scene.distance = known_distance(dataset, space, i, scene.rays);
     for (int p = 0; p < view.camera.width * view.camera.height; ++p)
       if (std::isfinite(scene.distance.at<float>(p / view.camera.width, p % view.camera.width)))

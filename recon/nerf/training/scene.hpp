@@ -26,6 +26,9 @@ struct NormalisedView {
 /// The ball of the scene that these views and points show (core/geometry/scene_ball.hpp).
 Space estimate_space(const Dataset& training);
 
+/// The span's values become 0..1.
+cv::Mat normalised(const cv::Mat& image, ValueSpan span);
+
 std::vector<NormalisedView> prepare_views(const Dataset& dataset, const Space& space,
                                           ValueSpan span);
 

@@ -11,6 +11,7 @@
 #include "core/geometry/lifted.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/nerf/training/confirms.hpp"
+#include "recon/nerf/training/even_sample.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -45,24 +46,6 @@ struct ShadedSample {
 };
 using ShadedPoint = std::vector<ShadedSample>;
 
-/// Mean of 3x3 pixels; none outside the image, beside dead pixels and on edges.
-std::optional<double> kelvin_at(const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  const int x = static_cast<int>(std::floor(pixel.x())),
-            y = static_cast<int>(std::floor(pixel.y()));
-  if (x < 2 || y < 2 || x + 2 >= image.cols || y + 2 >= image.rows) return std::nullopt;
-  float low = image.at<float>(y, x), high = low, sum = 0;
-  for (int dy = -2; dy <= 2; ++dy)
-    for (int dx = -2; dx <= 2; ++dx) {
-      const float k = image.at<float>(y + dy, x + dx);
-      if (!std::isfinite(k)) return std::nullopt;
-      low = std::min(low, k);
-      high = std::max(high, k);
-      if (std::abs(dx) < 2 && std::abs(dy) < 2) sum += k;
-    }
-  if (high - low > edge_k) return std::nullopt;
-  return sum / 9;
-}
-
 /// A place on a surface.
 struct SurfacePlace {
   Eigen::Vector3d world, normal;
@@ -91,7 +74,7 @@ std::optional<ShadedSample> seen_by(const Dataset& data, const DepthMap& map,
   const double facing = std::abs(normal.dot(p.normalized()));
   if (facing < least_facing) return std::nullopt;
   const Eigen::Vector2d pixel = view.camera.project(p);
-  const auto kelvin = kelvin_at(view.image, pixel);
+  const auto kelvin = even_sample(view.image, pixel, edge_k);
   if (!kelvin) return std::nullopt;
   const double away = 1 - facing;
   return ShadedSample{

@@ -212,12 +212,10 @@ void TrainingRun::even_levels(const Field* guide) {
   if (!found.told())
     return skip(fmt::format("levels of {} shared places differ by {:.1f} of 255 in the median",
                             found.points, found.before));
-  const float per_level = static_cast<float>(1 / (state_->span.high - state_->span.low));
   for (std::size_t i = 0; i < views_.size(); ++i) {
     const TrainingView& view = data_.dataset.views[i];
     report_.gray_curves[view.name] = found.of_view[i];
-    views_[i].target =
-        (to_common_levels(view.image, found.of_view[i]) - state_->span.low) * per_level;
+    views_[i].target = normalised(to_common_levels(view.image, found.of_view[i]), state_->span);
   }
 }
 
