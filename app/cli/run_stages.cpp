@@ -41,8 +41,10 @@ void announce(terminal::Console& console, const StageStatus& s, bool dry_run) {
     case StageState::planned:
       if (dry_run)
         console.info(fmt::format("{:<14} would run: {}", s.stage, s.why));
-      else
+      else if (console.draws_bars())
         console.detail(fmt::format("{:<14} starts: {}", s.stage, s.why));
+      else  // a log that stays empty for minutes looks like a program that hangs
+        console.info(fmt::format("{:<14} starts: {}", s.stage, s.why));
       break;
     case StageState::ran:
       console.info(fmt::format("{:<14} {:>6.1f} s  {}", s.stage, s.wall_s, brief));
@@ -61,7 +63,8 @@ void announce(terminal::Console& console, const StageStatus& s, bool dry_run) {
       break;
     case StageState::failed:
       // What to do comes last, where the program ends with it.
-      console.info(fmt::format("{:<14} failed: {}", s.stage, s.error->found));
+      if (s.error->kind != ErrorKind::cancelled)
+        console.info(fmt::format("{:<14} failed: {}", s.stage, s.error->found));
       break;
   }
 }

@@ -30,7 +30,9 @@ const std::vector<Verb>& verbs() {
          "--visible stills:FOLDER,existing=yes"}}},
       {"inspect", "Say what a session or a run folder holds", "orbitfuse inspect replay_data/car",
        add_inspect, none},
-      {"poses", "Estimate the camera poses of both modalities",
+      {"poses",
+       "Estimate the camera poses of both modalities (thermal ones by the visible field, which is "
+       "trained first)",
        "orbitfuse poses replay_data/car --out out/", add_poses, of_stages},
       {"train", "Train the visible and the thermal radiance field",
        "orbitfuse train replay_data/car --out out/ --budget 60s", add_train, of_stages},

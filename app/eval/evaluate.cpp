@@ -263,10 +263,13 @@ Status add_test_views(Run& run, const Session& session, const GroundTruth& truth
     result["thermal_psnr_db"] = sums.thermal_psnr / sums.thermal;
     result["thermal_covered"] = sums.covered / sums.thermal;
   }
-  if (!sums.levels.level.empty()) {
+  if (sums.levels.scene > 0) {
     const LevelError error = level_error(sums.levels);
-    result["gray_rank_correlation"] = error.rank_correlation;
-    result["gray_mae_c"] = error.mae_k;
+    result["thermal_covered"] = error.covered;
+    if (std::isfinite(error.rank_correlation)) {
+      result["gray_rank_correlation"] = error.rank_correlation;
+      result["gray_mae_c"] = error.mae_k;
+    }
   }
   run.result["test_views"] = result;
   return {};

@@ -51,32 +51,40 @@ void LevelPairs::add(const cv::Mat& levels, const cv::Mat& truth_k, double scene
   for (int y = 0; y < truth_k.rows; ++y)
     for (int x = 0; x < truth_k.cols; ++x) {
       const float t = truth_k.at<float>(y, x), l = levels.at<float>(y, x);
-      if (!(t > scene_above_k) || !std::isfinite(t) || !std::isfinite(l)) continue;
+      if (!(t > scene_above_k) || !std::isfinite(t)) continue;
+      ++scene;
+      if (!std::isfinite(l)) continue;
       level.push_back(l);
       kelvin.push_back(t);
     }
 }
 
 LevelError level_error(const LevelPairs& pairs) {
-  constexpr std::size_t groups = 256;
+  // A median of few says what these are, not what their level means.
+  constexpr std::size_t most_groups = 256, least_in_group = 100;
   const double nothing = std::nan("");
-  if (pairs.level.empty()) return {nothing, nothing};
-  const double correlation = rank_correlation(pairs.level, pairs.kelvin);
-  const auto [darkest, brightest] = std::minmax_element(pairs.level.begin(), pairs.level.end());
-  if (!(*darkest < *brightest)) return {nothing, nothing};
-  std::vector<std::size_t> order(pairs.level.size());
+  LevelError error{nothing, nothing, 0};
+  if (pairs.scene == 0) return error;
+  const std::size_t count = pairs.level.size();
+  error.covered = static_cast<double>(count) / static_cast<double>(pairs.scene);
+  const std::size_t groups = std::min(most_groups, count / least_in_group);
+  if (groups == 0) return error;
+  std::vector<std::size_t> order(count);
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return pairs.level[a] < pairs.level[b]; });
   double off = 0;
-  for (std::size_t g = 0; g < groups; ++g) {
+  for (std::size_t g = 1, begin = 0; begin < count; ++g) {
+    std::size_t end = std::max(begin + 1, g * count / groups);
+    while (end < count && pairs.level[order[end]] == pairs.level[order[end - 1]]) ++end;
     std::vector<double> kelvin;
-    for (std::size_t i = g * order.size() / groups; i < (g + 1) * order.size() / groups; ++i)
-      kelvin.push_back(static_cast<double>(pairs.kelvin[order[i]]));
+    for (; begin < end; ++begin) kelvin.push_back(static_cast<double>(pairs.kelvin[order[begin]]));
     const double usual = median(kelvin);
     for (const double k : kelvin) off += std::abs(k - usual);
   }
-  return {correlation, off / static_cast<double>(order.size())};
+  error.rank_correlation = rank_correlation(pairs.level, pairs.kelvin);
+  if (std::isfinite(error.rank_correlation)) error.mae_k = off / static_cast<double>(count);
+  return error;
 }
 
 }  // namespace orbitfuse::eval

@@ -22,6 +22,7 @@ ThermalViewError thermal_view_error(const cv::Mat& rendered_k, const cv::Mat& tr
 /// Gray levels and true temperatures of the same pixels, of all views.
 struct LevelPairs {
   std::vector<float> level, kelvin;
+  std::size_t scene = 0;  ///< pixels of the scene, whether they have a level or not
 
   /// As thermal_view_error() takes pixels.
   void add(const cv::Mat& levels, const cv::Mat& truth_k, double scene_above_k);
@@ -31,9 +32,10 @@ struct LevelError {
   double rank_correlation = 0;  ///< Spearman's: 1 where warmer always is brighter
   /// How far off temperatures are where each level stands for the one it usually has, mean.
   double mae_k = 0;
+  double covered = 0;  ///< share of the scene's pixels that have a level
 };
 
-/// NaN where there are no pairs, or one level alone.
+/// NaN where there are fewer than 100 pairs, or one level or temperature alone.
 LevelError level_error(const LevelPairs& pairs);
 
 }  // namespace orbitfuse::eval

@@ -8,11 +8,13 @@
 #include <opencv2/imgproc.hpp>
 
 #include "app/stages/artifacts.hpp"
+#include "app/stages/explained_share.hpp"
 #include "app/stages/metric_tables.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/image/image_io.hpp"
+#include "core/numeric/percent.hpp"
 #include "core/system/file_io.hpp"
 #include "core/system/side_by_side.hpp"
 #include "recon/assembly/training_data.hpp"
@@ -23,6 +25,9 @@ namespace {
 using nlohmann::json;
 using pipeline::StageContext;
 using pipeline::StageOutput;
+
+/// Errors of cameras rather than of fields.
+constexpr double noise_k = 0.5, noise_level = 0.02;
 
 /// Mean absolute difference where both images have a value.
 struct MeanError {
@@ -38,15 +43,17 @@ struct MeanError {
   double mean() const { return sum / count; }
 };
 
-/// Without and with detail. What a planner expects is the field's.
-struct HeldoutKelvin {
-  MeanError field_alone, shown;
+/// What held-out frames say of the fields.
+struct HeldoutScores {
+  MetricMeans means;
+  MeanError field_alone_k, shown_k;  ///< without and with detail; a planner expects the field's
+  std::map<Modality, ExplainedShare> explained;
 };
 
 /// Rendered, with the detail of all other recorded views, against recorded, on views that did not
 /// train (as Table 4 of the paper that fusion/metrics/metrics.hpp names).
 Status score_field(const StageContext& context, const StageInputs& in, Modality modality,
-                   MetricMeans& means, HeldoutKelvin& thermal_k) {
+                   HeldoutScores& scores) {
   const SessionInput& input = *in.session;
   const TrainConfig& config = in.config->train(modality);
   const std::string train = "train_" + std::string(name(modality));
@@ -81,22 +88,24 @@ Status score_field(const StageContext& context, const StageInputs& in, Modality 
         const std::array<double, 3>& gain = found->second;
         cv::multiply(rendered, cv::Scalar(gain[0], gain[1], gain[2]), rendered);
       }
+      scores.explained[modality].add(truth, rendered);
       truth.convertTo(truth, CV_8U, 255);
       rendered.convertTo(rendered, CV_8U, 255);
     } else {
       // The frame's lens shows what the field is without.
       const cv::Mat shading = nerf::shading_image(trained.shading_k, rendered.size());
       rendered = rendered + shading;
+      scores.explained[modality].add(truth, rendered);
       if (input.has_temperatures()) {
-        thermal_k.shown.add(truth, rendered);
-        thermal_k.field_alone.add(truth, field_alone + shading);
+        scores.shown_k.add(truth, rendered);
+        scores.field_alone_k.add(truth, field_alone + shading);
       }
       const TemperatureSpan span = common_span({truth}, 0, 100);
       truth = gray_of_kelvin(truth, span);
       rendered = gray_of_kelvin(rendered, span);
     }
     ORBITFUSE_ASSIGN(const auto values, render_metrics(truth, rendered));
-    means.add(std::string(name(modality)), view.name, values);
+    scores.means.add(std::string(name(modality)), view.name, values);
   }
   return {};
 }
@@ -143,12 +152,22 @@ Result<json> measured_share(const StageContext& context) {
   return fused.measured_share;
 }
 
+std::string poor_field_words(Modality modality, double explained) {
+  return fmt::format(
+      "the {0} field is poor: frames kept from training show it to have {1} of what varies in "
+      "them (of a good one, over 90 %), so that new views between the recorded ones are not to be "
+      "believed; more frames all round (one every 30 degrees or closer) help, and sharp ones of a "
+      "scene that stands still",
+      name(modality), explained > 0 ? percent(explained) : "nothing");
+}
+
 Result<StageOutput> score(const StageContext& context, const StageInputs& in) {
   const MetricsConfig& config = in.config->metrics;
-  MetricMeans fields, fused;
-  HeldoutKelvin thermal_k;
+  MetricMeans fused;
+  HeldoutScores heldout;
   for (const Modality modality : {Modality::visible, Modality::thermal})
-    ORBITFUSE_TRY(score_field(context, in, modality, fields, thermal_k));
+    ORBITFUSE_TRY(score_field(context, in, modality, heldout));
+  const MetricMeans& fields = heldout.means;
   ORBITFUSE_ASSIGN(const std::size_t unscored, score_fused(context, config.scored_views, fused));
   StageOutput output;
   if (unscored > 0)
@@ -176,9 +195,15 @@ Result<StageOutput> score(const StageContext& context, const StageInputs& in) {
       {"tables", tables},
       {"fields", fields.to_json()},
       {"fused", fused.to_json()}};
-  if (thermal_k.shown.count > 0) {
-    output.metrics["thermal_heldout_mae_k"] = thermal_k.shown.mean();
-    output.metrics["thermal_heldout_field_mae_k"] = thermal_k.field_alone.mean();
+  if (heldout.shown_k.count > 0) {
+    output.metrics["thermal_heldout_mae_k"] = heldout.shown_k.mean();
+    output.metrics["thermal_heldout_field_mae_k"] = heldout.field_alone_k.mean();
+  }
+  for (const auto& [modality, explained] : heldout.explained) {
+    const bool kelvin = modality == Modality::thermal && in.session->has_temperatures();
+    output.metrics[fmt::format("{}_heldout_explained", name(modality))] = explained.share();
+    if (explained.is_poor(kelvin ? noise_k : noise_level))
+      output.warnings.push_back(poor_field_words(modality, explained.share()));
   }
   return output;
 }

@@ -33,7 +33,7 @@ std::vector<ReadPlace> places_of(const std::string& name, const Answer& answer) 
       for (std::size_t i = 0; i < answer.spots.size(); ++i)
         places.push_back(
             {answer.spots.size() == 1 ? name : fmt::format("{}, place {}", name, i + 1),
-             &answer.spots[i].reading, answer.spots[i].position});
+             &answer.spots[i].reading, answer.spots[i].position, notes_of(answer, i)});
       return places;
     case Kind::difference:
       for (std::size_t i = 0; i < answer.of.size(); ++i)
@@ -42,12 +42,17 @@ std::vector<ReadPlace> places_of(const std::string& name, const Answer& answer) 
           places.push_back(std::move(part));
       return places;
     default:
-      places.push_back({name, &answer.reading, answer.position});
+      places.push_back({name, &answer.reading, answer.position, notes_of(answer)});
       return places;
   }
 }
 
 namespace {
+
+/// The user's, then the program's.
+std::string remarks(const SavedMeasurement& saved, const std::string& notes) {
+  return saved.remark + (saved.remark.empty() || notes.empty() ? "" : "; ") + notes;
+}
 
 std::vector<std::string> row_of(const ReadPlace& place, const SavedMeasurement& saved,
                                 const std::string& parameters) {
@@ -64,14 +69,14 @@ std::vector<std::string> row_of(const ReadPlace& place, const SavedMeasurement& 
               ? fmt::format("{} at {:.0f},{:.0f}", best->frame, best->pixel.x(), best->pixel.y())
               : "",
           parameters,
-          saved.remark};
+          remarks(saved, place.notes)};
 }
 
 std::vector<std::string> other_row(const SavedMeasurement& saved, const Answer& answer) {
   std::vector<std::string> row(10);
   row[0] = saved.name;
   row[1] = measurement::name(answer.kind);
-  row[9] = saved.remark;
+  row[9] = remarks(saved, notes_of(answer));
   if (answer.kind == Kind::difference) {
     row[2] = std::isfinite(answer.difference_k) ? fmt::format("{:+.2f} K", answer.difference_k)
                                                 : "no frame sees both";

@@ -17,6 +17,7 @@ struct ReadPlace {
   std::string name;  ///< of the measurement, with a number where it has several places
   const measurement::TemperatureReading* reading = nullptr;
   std::optional<Eigen::Vector3d> position;
+  std::string notes;  ///< what is to be known beside the figures
 };
 
 /// The places of an answer, which must outlive them: of hottest and coldest each, of a difference

@@ -32,6 +32,8 @@ class Console {
   /// went away (head) has what it wanted.
   Status output_status() const;
   bool verbose() const { return options_.verbosity > 0; }
+  /// Whether a person sees how far the work is.
+  bool draws_bars() const { return options_.terminal && !options_.json; }
   void info(const std::string& message);
   void detail(const std::string& message);  ///< with -v only
   void warning(const std::string& message);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include "app/cli/run_folder.hpp"
 #include "app/cli/typed_options.hpp"
 #include "app/cli/verb.hpp"
 #include "app/comparison/comparison_files.hpp"
@@ -39,6 +40,15 @@ void tell(Context& context, const CompareArguments& o, const ComparedRuns& runs)
   context.console.info((fs::path(o.out) / "compare.html").string());
 }
 
+/// Two runs of one session differ by what the program did, not by what the object did.
+bool are_of_one_session(const std::string& before, const std::string& after) {
+  const auto id = [](const std::string& run) {
+    const nlohmann::json told = earlier_run(run).value_or(nlohmann::json());
+    return told.is_object() ? told.value("session_id", nlohmann::json()) : nlohmann::json();
+  };
+  return id(before).is_string() && id(before) == id(after);
+}
+
 Status run(Context& context, const CompareArguments& o) {
   ORBITFUSE_TRY(check_typed({{"--triangles", o.triangles, from_to(4, 20'000'000)}}));
   CompareRequest request;
@@ -57,6 +67,10 @@ Status run(Context& context, const CompareArguments& o) {
       return fail(ErrorKind::usage, "--out", "'" + o.out + "', inside of a stage of " + run,
                   "name a new folder");
   ORBITFUSE_TRY(pipeline::check_out_folder(o.out));
+  if (are_of_one_session(o.before, o.after))
+    context.console.warning(
+        "both runs are of one session: what differs is what two runs of the same frames differ by, "
+        "no change of the object");
   if (context.common.dry_run) {
     ORBITFUSE_TRY(check_comparable(o.before, o.after, context.config, request, context.progress));
     context.console.info(

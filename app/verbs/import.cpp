@@ -169,7 +169,10 @@ Status check_alone(const ImportArguments& o) {
 
 /// A folder of its own for each session: "car_out" beside "car/".
 std::string out_beside(const std::string& session) {
-  const std::filesystem::path folder = std::filesystem::path(session).lexically_normal();
+  const std::filesystem::path folder =
+      session.find_first_not_of("./") == std::string::npos
+          ? std::filesystem::absolute(session).lexically_normal()  // "." has no name to add to
+          : std::filesystem::path(session).lexically_normal();
   const std::filesystem::path last = folder.has_filename() ? folder : folder.parent_path();
   return last.string() + "_out";
 }

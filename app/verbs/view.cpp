@@ -20,8 +20,9 @@ struct ViewArguments {
 Status view_run(Context& context, const ViewArguments& o) {
   ORBITFUSE_ASSIGN(const PageOptions page,
                    page_options_of("--page", o.page, o.token).map_error(as_typed_page));
-  ORBITFUSE_ASSIGN(view::FinishedRun run,
-                   view::load_finished_run(o.run, context.config, context.progress));
+  auto loaded = view::load_finished_run(o.run, context.config, context.progress);
+  if (!loaded && loaded.error().kind == ErrorKind::cancelled) return {};
+  ORBITFUSE_ASSIGN(view::FinishedRun run, std::move(loaded));
   for (const std::string& note : run.notes) context.console.warning(note);
   context.result = {{"run", o.run}, {"views", run.views.size()}, {"points", run.surface.size()}};
   view::ViewServer server(std::move(run), page,

@@ -63,11 +63,14 @@ Status load_fields(const pipeline::StageContext& context, FinishedRun& run) {
 
 Status load_views(const pipeline::StageContext& context, FinishedRun& run) {
   if (run.has(Modality::thermal)) {
-    if (const auto trained = stages::load_trained_frames(context.of("train_thermal")))
+    auto trained = stages::load_trained_frames(context.of("train_thermal"));
+    if (trained) {
       run.shading_k = trained->shading_k;
-    else
-      run.notes.push_back("photos are shown with the shading of their lens: " +
+      run.gray_curves = std::move(trained->gray_curves);
+    } else {
+      run.notes.push_back("thermal photos are shown as recorded, not as the field learned them: " +
                           trained.error().message());
+    }
   }
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const std::string stage = "poses_" + std::string(name(modality));

@@ -43,6 +43,8 @@ struct FinishedRun {
   double radius = 1;   ///< of the recorded cameras round the centre
   PointCloud surface;  ///< colours, temperatures or both
   bool thermal_is_gray = false;
+  /// From a gray thermal frame's levels to the field's; empty: they are.
+  std::map<std::string, nerf::GrayCurve> gray_curves;
   double shading_k = 0;  ///< nerf::shading_image(): in every thermal frame, not in the field
   TemperatureSpan span;  ///< the run's, one for all its pictures
   HeatScale heat;

@@ -47,6 +47,8 @@ Result<std::string> photo(const FinishedRun& run, std::size_t index) {
     cv::Mat gray = no_wider(image, widest_px, cv::INTER_AREA), levels;
     if (gray.channels() == 3) cv::cvtColor(gray, gray, cv::COLOR_BGR2GRAY);
     gray.convertTo(levels, CV_32F);
+    if (const auto curve = run.gray_curves.find(recorded.view.name); curve != run.gray_curves.end())
+      levels = nerf::to_common_levels(levels, curve->second);  // as the field has them
     parts.add_levels("thermal", levels, true);
   } else {
     ORBITFUSE_ASSIGN(cv::Mat recorded_k, read_thermal_k(file));

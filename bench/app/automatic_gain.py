@@ -2,12 +2,12 @@
 # SPDX-License-Identifier: BSD-3-Clause
 """Thermal images as a camera on automatic shows them: 8 bits, another curve for each image.
 
-    bench/app/automatic_gain.py SCENE OUT span|equalised|palette
+    bench/app/automatic_gain.py SCENE OUT span|equalised|palette|mixed
 
 SCENE holds visible/, thermal/ (16-bit TIFF, centikelvin), test/ and ground_truth.json. OUT gets
 thermal/ with JPEGs (span: each image between its own 1 and 99 percentiles; equalised: histogram
-with a plateau; palette: span, in false colours), links to the rest, and a ground_truth.json that
-names the JPEGs. Then:
+with a plateau; palette: span, in false colours; mixed: span, every fourth black-hot), links to the
+rest, and a ground_truth.json that names the JPEGs. Then:
 
     orbitfuse import S --visible OUT/visible --thermal OUT/thermal \\
         --ground-truth OUT/ground_truth.json --priors-only --station-spacing-deg 30 --loops 2
@@ -33,15 +33,17 @@ def curve_of(image: np.ndarray, kind: str) -> np.ndarray:
 
 
 def main() -> None:
-    if len(sys.argv) != 4 or sys.argv[3] not in ("span", "equalised", "palette"):
+    if len(sys.argv) != 4 or sys.argv[3] not in ("span", "equalised", "palette", "mixed"):
         sys.exit(__doc__)
     scene, out, kind = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3]
     (out / "thermal").mkdir(parents=True)
     for name in ("visible", "test"):
         (out / name).symlink_to(scene / name)
-    for file in sorted((scene / "thermal").glob("*.tiff")):
+    for number, file in enumerate(sorted((scene / "thermal").glob("*.tiff"))):
         image = cv2.imread(str(file), cv2.IMREAD_UNCHANGED).astype(np.float64)
         gray = np.round(255 * curve_of(image, kind)).astype(np.uint8)
+        if kind == "mixed" and number % 4 == 3:
+            gray = 255 - gray
         if kind == "palette":
             gray = cv2.applyColorMap(gray, cv2.COLORMAP_INFERNO)
         cv2.imwrite(str(out / "thermal" / (file.stem + ".jpg")), gray, [cv2.IMWRITE_JPEG_QUALITY, 92])

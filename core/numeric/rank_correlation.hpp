@@ -10,15 +10,17 @@
 
 namespace orbitfuse {
 
-/// Where the samples stand from below, counted from 0; equal ones share their mean place.
+/// Where the samples, all finite, stand from below, counted from 0; equal ones share their mean
+/// place.
 inline std::vector<double> ranks(const std::vector<float>& values) {
+  assert(std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); }));
   std::vector<std::size_t> order(values.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
   std::vector<double> result(values.size());
   for (std::size_t begin = 0; begin < order.size();) {
-    std::size_t end = begin;
+    std::size_t end = begin + 1;
     while (end < order.size() && values[order[end]] == values[order[begin]]) ++end;
     const double middle = 0.5 * static_cast<double>(begin + end - 1);
     for (; begin < end; ++begin) result[order[begin]] = middle;

@@ -132,8 +132,11 @@ Result<Session> open_session(const std::filesystem::path& folder) {
                 "give a session folder");
   }
   if (std::filesystem::status(file, ignored).type() == std::filesystem::file_type::not_found) {
-    return fail(ErrorKind::input, folder.string(), "no manifest.jsonl, so not a session",
-                "make one with: orbitfuse import");
+    return fail(
+        ErrorKind::input, folder.string(), "no manifest.jsonl, so not a session",
+        fmt::format("make one with: orbitfuse import NEW_SESSION --visible {0} (or --thermal "
+                    "{0})",
+                    folder.string()));
   }
   ORBITFUSE_ASSIGN(std::string text, read_file(file));
   // Editors and tools leave blank lines behind the last one; between lines they are damage.

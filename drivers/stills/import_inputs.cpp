@@ -227,8 +227,8 @@ class Gathering {
                 fmt::format("the same image as {}, and so are all thermal ones: photos are no "
                             "thermal images",
                             photos.at(thermal.front().hash).string()),
-                "give the thermal camera's own files with --thermal (photos inside radiometric "
-                "JPEGs come with --embedded-visible)");
+                "give the thermal camera's own files with --thermal and the photos alone with "
+                "--visible (photos inside radiometric JPEGs come with --embedded-visible)");
   }
 
   /// Only radiometric JPEGs say what was assumed of the object; temperatures of others are as they

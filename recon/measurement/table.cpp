@@ -52,7 +52,8 @@ std::string joined(const std::vector<std::string>& notes) {
   return text;
 }
 
-/// Of one of several places: its own, and what is said of the whole answer.
+}  // namespace
+
 std::string notes_of(const Answer& answer, std::size_t spot) {
   std::vector<std::string> notes = answer.spots[spot].notes;
   for (const std::string& note : answer.notes) {
@@ -64,8 +65,7 @@ std::string notes_of(const Answer& answer, std::size_t spot) {
   }
   return joined(notes);
 }
-
-}  // namespace
+std::string notes_of(const Answer& answer) { return joined(answer.notes); }
 
 std::string csv_header() {
   return "name,kind,temperature_c,uncertainty_k,field_c,mean_c,min_c,max_c,standard_deviation_k,"
@@ -81,7 +81,7 @@ std::vector<std::string> csv_rows(const std::string& name, const Answer& answer)
           .kind = kind,
           .position = answer.position,
           .emissivity = answer.radiometry.emissivity,
-          .note = joined(answer.notes)};
+          .note = notes_of(answer)};
   switch (answer.kind) {
     case Kind::hottest:
     case Kind::coldest:

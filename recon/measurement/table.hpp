@@ -16,6 +16,11 @@ std::string csv_header();
 /// field.
 std::vector<std::string> csv_rows(const std::string& name, const Answer& answer);
 
+/// What is to be known beside a figure: of place `spot` of several, and of the whole answer.
+std::string notes_of(const Answer& answer, std::size_t spot);
+/// The same of an answer of one place.
+std::string notes_of(const Answer& answer);
+
 /// For people, e.g. "36.12 C +- 0.31 (14 frames 35.90 to 36.41; field 36.05; 31 deg)".
 std::string described(const TemperatureReading& reading);
 /// What "+-" stands for in these, as a sentence's end.

@@ -32,7 +32,8 @@ struct TrainingView {
 /// unit of length is free.
 struct Dataset {
   Modality modality = Modality::visible;
-  /// Thermal samples are 8-bit intensities, not temperatures: only the output's label changes.
+  /// Thermal samples are 8-bit intensities, not temperatures. Each view may have been made by a
+  /// curve of its own (training/gray_curves.hpp).
   bool thermal_is_gray = false;
   std::vector<TrainingView> views;
   std::vector<SparsePoint> points;  ///< optional; Observation::view indexes `views`

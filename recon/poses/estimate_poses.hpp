@@ -60,7 +60,8 @@ struct LadderStep {
   std::string why;  ///< figures behind the verdict, in words
   int posed = 0, total = 0;
   double seconds = 0;
-  bool bettered = false;  ///< believed, and replaced by what a later attempt made
+  bool bettered = false;          ///< believed, and replaced by what a later attempt made
+  bool against_stations = false;  ///< what spoke against the model was also its stations
 };
 
 /// A view without a supported pose, dropped rather than kept.

@@ -16,30 +16,13 @@ namespace orbitfuse {
 
 namespace {
 
-/// From the images; `steps` holds what was tried before.
-Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visible,
-                               const PoseOptions& options, const std::filesystem::path& workdir,
-                               const Progress& progress, std::vector<LadderStep> steps) {
+/// From the images, but not as one rig; `steps` holds what was tried before.
+Result<ThermalPoses> estimated_apart(const Session& session, const VisibleScene* visible,
+                                     const PoseOptions& options,
+                                     const std::filesystem::path& workdir, const Progress& progress,
+                                     std::vector<LadderStep> steps) {
   const auto frames = session.frames_of(Modality::thermal, options.use_tracking_frames);
-  if (frames.size() < 2)
-    return fail(ErrorKind::input, session.folder.string(),
-                fmt::format("{} thermal frames, at least 2 are needed", frames.size()),
-                "record or import more views");
   if (visible != nullptr) {
-    const RigPairs rig = find_rig_pairs(session);
-    if (rig.declared && rig.pairs.empty())
-      steps.push_back({"rig", false,
-                       "the session says that its cameras are one rig, but neither names nor times "
-                       "pair four fifths of the thermal frames with photos",
-                       0, static_cast<int>(frames.size()), 0});
-    if (!rig.pairs.empty()) {
-      auto by_rig = pose_by_rig(session, visible->reconstruction, rig, progress, steps);
-      if (!by_rig && by_rig.error().kind != ErrorKind::quality) return by_rig;
-      if (by_rig) {
-        by_rig->ladder = std::move(steps);
-        return by_rig;
-      }
-    }
     const std::size_t tried = steps.size();
     auto localised = localise_in_visible(session, *visible, frames, options, progress, steps);
     if (localised) {
@@ -62,6 +45,37 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
   return ThermalPoses{std::move(poses), false};
 }
 
+/// From the images; `steps` holds what was tried before.
+Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visible,
+                               const PoseOptions& options, const std::filesystem::path& workdir,
+                               const Progress& progress, std::vector<LadderStep> steps) {
+  const auto frames = session.frames_of(Modality::thermal, options.use_tracking_frames);
+  if (frames.size() < 2)
+    return fail(ErrorKind::input, session.folder.string(),
+                fmt::format("{} thermal frames, at least 2 are needed", frames.size()),
+                "record or import more views");
+  const RigPairs rig = visible != nullptr ? find_rig_pairs(session) : RigPairs();
+  if (rig.declared && rig.pairs.empty())
+    steps.push_back({"rig", false,
+                     "neither names nor times pair four fifths of the thermal frames with photos",
+                     0, static_cast<int>(frames.size()), 0});
+  if (!rig.pairs.empty()) {
+    auto by_rig = pose_by_rig(session, visible->reconstruction, rig, progress, steps);
+    if (!by_rig && by_rig.error().kind != ErrorKind::quality) return by_rig;
+    if (by_rig) {
+      by_rig->ladder = std::move(steps);
+      return by_rig;
+    }
+  }
+  const std::string no_rig = rig.declared && !steps.empty() ? steps.back().why : std::string();
+  ORBITFUSE_ASSIGN(ThermalPoses poses,
+                   estimated_apart(session, visible, options, workdir, progress, std::move(steps)));
+  if (!no_rig.empty())
+    poses.warnings.push_back("the session says that its cameras are one rig, but " + no_rig +
+                             ": the thermal frames were posed as if shot apart");
+  return poses;
+}
+
 /// Who was wrong about the photos' stations was about these.
 bool stations_doubtful(const Session& session, const VisibleScene* visible,
                        const PoseOptions& options) {
@@ -70,6 +84,22 @@ bool stations_doubtful(const Session& session, const VisibleScene* visible,
     return false;
   const auto fit = fit_stations(visible->reconstruction.views, session);
   return fit && contradicted(*fit, options);
+}
+
+/// From the images, and from no stations that the photos' make doubtful, if that is enough.
+Result<ThermalPoses> from_images(const Session& session, const VisibleScene* visible,
+                                 const PoseOptions& options, const std::filesystem::path& workdir,
+                                 const Progress& progress, const std::vector<LadderStep>& steps) {
+  if (stations_doubtful(session, visible, options)) {
+    auto poses = estimated(in_order_alone(session, Modality::thermal), visible, options, workdir,
+                           progress, steps);
+    if (poses)
+      poses->warnings.push_back(
+          "the photos contradict the stations they were declared with: of the thermal frames the "
+          "order alone was used");
+    if (poses || poses.error().kind != ErrorKind::quality) return poses;
+  }
+  return estimated(session, visible, options, workdir, progress, steps);
 }
 
 /// Known poses that nothing confirms and nothing can replace.
@@ -89,16 +119,8 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
                                             const Progress& progress) {
   ORBITFUSE_TRY(options.validate());
   ORBITFUSE_TRY(progress.check("poses.thermal"));
-  if (!options.use_known_poses || !has_known_poses(session, Modality::thermal)) {
-    if (!stations_doubtful(session, visible, options))
-      return estimated(session, visible, options, workdir, progress, {});
-    ORBITFUSE_ASSIGN(ThermalPoses poses, estimated(in_order_alone(session, Modality::thermal),
-                                                   visible, options, workdir, progress, {}));
-    poses.warnings.push_back(
-        "the photos contradict the stations they were declared with: of the thermal frames the "
-        "order alone was used");
-    return poses;
-  }
+  if (!options.use_known_poses || !has_known_poses(session, Modality::thermal))
+    return from_images(session, visible, options, workdir, progress, {});
   ORBITFUSE_ASSIGN(ModalityPoses known, known_poses(session, Modality::thermal));
   // Known poses of a session share one world; estimated visible ones do not live in it.
   const bool shares = visible != nullptr && has_known_poses(session, Modality::visible);
@@ -109,8 +131,8 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   LadderStep step = known.ladder.back();
   step.held = false, step.why = contradiction->words;
   Result<ThermalPoses> poses =
-      estimated(without_known_poses(session, Modality::thermal, contradiction->true_focal), visible,
-                options, workdir, progress, {step});
+      from_images(without_known_poses(session, Modality::thermal, contradiction->true_focal),
+                  visible, options, workdir, progress, {step});
   if (!poses && poses.error().kind == ErrorKind::cancelled) return poses;
   // An answer in a world of its own is worth less than poses that may be right in this one.
   const bool found = poses && poses->shares_visible_frame;

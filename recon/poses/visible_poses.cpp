@@ -33,9 +33,22 @@ void tell_side(ModalityPoses& poses) {
         100 * share));
 }
 
+/// Which views of a model that contradicts its declared stations stand where no spacing of even
+/// steps has them; nothing where the stations are right, or so many are that the model is wrong.
+std::optional<std::vector<std::string>> astray_of_another_spacing(
+    const std::vector<PosedView>& views, const Session& session, const PoseOptions& options) {
+  const auto fit = fit_stations(views, session);
+  if (!fit || !contradicted(*fit, options)) return std::nullopt;
+  auto astray = unevenly_spaced(views, session);
+  if (astray &&
+      static_cast<double>(astray->size()) > max_contradicting * static_cast<double>(views.size()))
+    return std::nullopt;
+  return astray;
+}
+
 /// A spacing that was declared wrongly contradicts every model that is right: none is believed, or
 /// most views are missing. Then the photos are posed in the order they were taken in alone, which a
-/// model must keep, and that counts where it is believed.
+/// model must keep, and which counts where another even spacing explains it.
 Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& options,
                                      const std::filesystem::path& workdir, const Progress& progress,
                                      std::vector<LadderStep>& steps) {
@@ -45,26 +58,32 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
                 fmt::format("{} visible frames, at least 2 are needed", frames.size()),
                 "record or import more views");
   auto poses = pose_visible_views(session, frames, options, workdir / "visible", progress, steps);
-  if (poses || poses.error().kind != ErrorKind::quality || !have_declared_stations(frames))
+  if (poses || poses.error().kind != ErrorKind::quality || !have_declared_stations(frames) ||
+      std::none_of(steps.begin(), steps.end(),
+                   [](const LadderStep& step) { return step.against_stations; }))
     return poses;
   const Session ordered = in_order_alone(session, Modality::visible);
   const std::size_t before = steps.size();
   auto anew =
       pose_visible_views(ordered, ordered.frames_of(Modality::visible, options.use_tracking_frames),
                          options, workdir / "visible_in_order", progress, steps);
-  if (!anew && anew.error().kind == ErrorKind::cancelled) return anew;
+  if (!anew && anew.error().kind != ErrorKind::quality) return anew;
   for (std::size_t i = before; i < steps.size(); ++i) steps[i].attempt += ", in order alone";
-  // Another spacing than the declared one, not views folded onto another side.
-  if (!anew || !evenly_spaced(anew->reconstruction.views, ordered, max_contradicting)) {
-    for (std::size_t i = before; i < steps.size(); ++i) steps[i].held = false;
+  const auto astray =
+      anew ? astray_of_another_spacing(anew->reconstruction.views, session, options) : std::nullopt;
+  if (!astray) {
+    for (std::size_t i = before; i < steps.size(); ++i) {
+      if (steps[i].held) steps[i].why += "; no even spacing but the declared one explains it";
+      steps[i].held = false;
+    }
     poses.error().remedy +=
-        "; are the stations right (--station-spacing-deg, --loops)? Without "
-        "them, in the order of the photos alone, nothing held either";
+        "; are the stations right (--station-spacing-deg, --loops)? The order of the photos alone, "
+        "with any other even spacing, gave no model either";
     return poses;
   }
-  if (const auto fit = fit_stations(anew->reconstruction.views, session);
-      !fit || !contradicted(*fit, options))
-    return anew;
+  for (const std::string& name : *astray)
+    anew->doubtful.push_back({name, DoubtReason::off_its_loop,
+                              "it stands aside of where the even spacing of the others has it"});
   anew->warnings.push_back(
       "the photos contradict the stations they were declared with: they are posed in their order "
       "alone; check --station-spacing-deg and --loops, or import without them");

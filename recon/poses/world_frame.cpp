@@ -142,38 +142,53 @@ std::optional<StationFit> fit_stations(const std::vector<PosedView>& views,
   return best;
 }
 
-bool evenly_spaced(const std::vector<PosedView>& views, const Session& session,
-                   double most_astray) {
+std::optional<std::vector<std::string>> unevenly_spaced(const std::vector<PosedView>& views,
+                                                        const Session& session) {
+  // Spacings are tried round the usual one, for a degree of it is most of a step after a walk of
+  // two loops.
   constexpr double astray_deg = 20, off_deg = 6, step_deg = 0.1;
   std::map<std::string, const FrameRecord*> by_name;
-  for (const FrameRecord& frame : session.frames) by_name[frame.file] = &frame;
+  std::map<Modality, int> per_loop;  // of all frames, whether they were posed or not
+  for (const FrameRecord& frame : session.frames) {
+    if (frame.tracking || !frame.station) continue;
+    by_name[frame.file] = &frame;
+    int& stations = per_loop[frame.modality];
+    stations = std::max(stations, frame.station->index + 1);
+  }
+  struct Placed {
+    double place, azimuth_deg;
+    std::string name;
+  };
+  std::vector<Placed> placed;
   const Similarity3d canonical = canonical_from_world(views, {});
-  std::map<std::uint64_t, double> azimuth_at;  // in the order they were recorded in
   for (const PosedView& view : views)
-    if (const auto found = by_name.find(view.name);
-        found != by_name.end() && !found->second->tracking)
-      azimuth_at[found->second->sequence] =
-          orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg;
-  std::vector<double> azimuth, place;
-  for (const auto& [sequence, deg] : azimuth_at)
-    azimuth.push_back(deg), place.push_back(static_cast<double>(sequence));
-  if (azimuth.size() < 3) return false;
+    if (const auto found = by_name.find(view.name); found != by_name.end()) {
+      const Station& station = *found->second->station;
+      placed.push_back(
+          {static_cast<double>(station.loop * per_loop[found->second->modality] + station.index),
+           orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg, view.name});
+    }
+  if (placed.size() < 3) return std::nullopt;
+  std::sort(placed.begin(), placed.end(),
+            [](const Placed& a, const Placed& b) { return a.place < b.place; });
   std::vector<double> rates;
-  for (std::size_t i = 1; i < azimuth.size(); ++i)
-    rates.push_back(wrapped_deg(azimuth[i] - azimuth[i - 1]) / (place[i] - place[i - 1]));
+  for (std::size_t i = 1; i < placed.size(); ++i)
+    if (const double steps = placed[i].place - placed[i - 1].place; steps > 0)
+      rates.push_back(wrapped_deg(placed[i].azimuth_deg - placed[i - 1].azimuth_deg) / steps);
+  if (rates.empty()) return std::nullopt;
   const double usual = median(rates);
-  // A degree of it is most of a step after a walk of two loops: the best of those near by counts.
-  std::ptrdiff_t fewest = std::ssize(azimuth);
+  std::optional<std::vector<std::string>> fewest;
   for (double spacing = usual - off_deg; spacing <= usual + off_deg; spacing += step_deg) {
     std::vector<double> difference;
-    for (std::size_t i = 0; i < azimuth.size(); ++i)
-      difference.push_back(azimuth[i] - spacing * place[i]);
+    for (const Placed& p : placed) difference.push_back(p.azimuth_deg - spacing * p.place);
     const double offset = robust_offset_deg(difference);
-    fewest = std::min(fewest, std::count_if(difference.begin(), difference.end(), [&](double d) {
-                        return std::abs(wrapped_deg(d - offset)) > astray_deg;
-                      }));
+    std::vector<std::string> astray;
+    for (std::size_t i = 0; i < placed.size(); ++i)
+      if (std::abs(wrapped_deg(difference[i] - offset)) > astray_deg)
+        astray.push_back(placed[i].name);
+    if (!fewest || astray.size() < fewest->size()) fewest = std::move(astray);
   }
-  return static_cast<double>(fewest) <= most_astray * static_cast<double>(azimuth.size());
+  return fewest;
 }
 
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session) {

@@ -23,7 +23,8 @@ bool tells_azimuth(const std::optional<Station>& station);
 /// measures them.
 bool have_declared_stations(const std::vector<const FrameRecord*>& frames);
 
-/// Stations of that modality tell no azimuth any more.
+/// Stations of that modality tell no azimuth any more (a sigma of 180 degrees; in a manifest it
+/// would be read as declared again).
 Session in_order_alone(Session session, Modality modality);
 
 /// Every frame has a station that tells its azimuth.
@@ -75,9 +76,10 @@ struct CaptureOrder {
 /// Only stations and tracking frames have an order that means something; steps = 0 for others.
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session);
 
-/// Whether the views stand evenly round the orbit in the order they were recorded in, so many
-/// degrees apart whatever their stations say: all but `most_astray` of them within 20 degrees of
-/// that. Of a model that merged front and back half the views are astray. False for fewer than 3.
-bool evenly_spaced(const std::vector<PosedView>& views, const Session& session, double most_astray);
+/// The views of declared stations that stand more than 20 degrees from where even spacing round the
+/// orbit has them, so many degrees apart in the order of the stations, whatever these say. Of a
+/// model that merged front and back it is half the views. Nothing for fewer than three.
+std::optional<std::vector<std::string>> unevenly_spaced(const std::vector<PosedView>& views,
+                                                        const Session& session);
 
 }  // namespace orbitfuse

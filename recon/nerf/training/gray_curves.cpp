@@ -5,76 +5,20 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
-#include "core/geometry/lens_fold.hpp"
-#include "core/geometry/lifted.hpp"
+#include "core/image/samples.hpp"
 #include "core/numeric/median.hpp"
-#include "recon/nerf/training/confirms.hpp"
-#include "recon/nerf/training/even_sample.hpp"
+#include "recon/nerf/training/gray_sights.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
 
 constexpr std::size_t curve_knots = std::tuple_size_v<GrayCurve>;
 constexpr double gray_levels = 255, knot_step = gray_levels / (curve_knots - 1);
-constexpr double least_gray = 2, most_gray = 253;  ///< beyond, a camera clipped what it saw
-constexpr float gray_edge = 40;                    ///< range of 5x5 pixels: beyond, poses decide
-constexpr int sight_step_px = 3;                   ///< between the points of a depth map
-constexpr std::size_t most_askers = 24;            ///< asked for a place, spread over the orbit
-constexpr int least_sights = 300;
+constexpr std::size_t least_sights = 300;
+constexpr std::size_t least_samples = 100;  ///< of a view, for its curve to say something
 
 double level_of(std::size_t knot) { return knot_step * static_cast<double>(knot); }
-
-struct LevelSample {
-  int view;
-  double level, weight = 1;
-};
-using LevelSight = std::vector<LevelSample>;
-
-/// None where the camera clipped, either.
-std::optional<double> level_at(const cv::Mat& image, const Eigen::Vector2d& pixel) {
-  const auto level = even_sample(image, pixel, gray_edge);
-  return level && *level > least_gray && *level < most_gray ? level : std::nullopt;
-}
-
-/// Where views that train see a point of one of their maps, and what of it views held out see.
-struct LevelSights {
-  std::vector<LevelSight> seen, by_heldout;
-};
-
-LevelSights level_sights(const Dataset& data, const std::vector<DepthMap>& depth,
-                         const std::vector<bool>& heldout) {
-  const auto trains = [&](const DepthMap& map) {
-    return !heldout[static_cast<std::size_t>(map.view)];
-  };
-  const std::size_t asked = std::min(depth.size(), most_askers);
-  LevelSights sights;
-  for (std::size_t own = 0; own < depth.size(); ++own) {
-    const DepthMap& map = depth[own];
-    if (!trains(map)) continue;
-    const Rigid3d world_from_cam =
-        data.views[static_cast<std::size_t>(map.view)].cam_from_world.inverse();
-    for (int y = 1; y + 1 < map.depth.rows; y += sight_step_px)
-      for (int x = 1; x + 1 < map.depth.cols; x += sight_step_px) {
-        if (!std::isfinite(map.depth.at<float>(y, x))) continue;
-        const Eigen::Vector3d world = world_from_cam * lifted(map.depth, map.camera, x, y);
-        LevelSight sight, apart;
-        for (std::size_t k = 0; k < asked; ++k) {
-          const DepthMap& other = depth[(own + k * depth.size() / asked) % depth.size()];
-          const TrainingView& view = data.views[static_cast<std::size_t>(other.view)];
-          const Eigen::Vector3d p = view.cam_from_world * world;
-          if (!confirms(other, p) || !lens_holds(view.camera, p)) continue;
-          if (const auto level = level_at(view.image, view.camera.project(p)))
-            (trains(other) ? sight : apart).push_back({other.view, *level});
-        }
-        if (sight.size() < 2) continue;
-        sights.seen.push_back(std::move(sight));
-        sights.by_heldout.push_back(std::move(apart));
-      }
-  }
-  return sights;
-}
 
 /// A level between its two knots.
 struct KnotPair {
@@ -93,6 +37,45 @@ double common_level(const GrayCurve& curve, double level) {
   return (1 - at.above) * curve[at.knot] + at.above * curve[at.knot + 1];
 }
 
+/// The nearest curve that rises, by least squares (pool adjacent violators).
+void make_rise(GrayCurve& curve, const GrayCurve& weights) {
+  struct Pool {
+    double value, weight;
+    std::size_t knots;
+  };
+  std::vector<Pool> pools;
+  for (std::size_t k = 0; k < curve_knots; ++k) {
+    pools.push_back({curve[k], weights[k], 1});
+    while (pools.size() > 1 && pools[pools.size() - 2].value > pools.back().value) {
+      const Pool last = pools.back();
+      pools.pop_back();
+      Pool& pool = pools.back();
+      pool.value =
+          (pool.weight * pool.value + last.weight * last.value) / (pool.weight + last.weight);
+      pool.weight += last.weight;
+      pool.knots += last.knots;
+    }
+  }
+  std::size_t k = 0;
+  for (const Pool& pool : pools)
+    for (std::size_t i = 0; i < pool.knots; ++i) curve[k++] = pool.value;
+}
+
+/// How levels of one view go with the levels of the same points elsewhere.
+struct Together {
+  double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  void add(double own, double others) {
+    ++n, x += own, y += others;
+    xx += own * own, yy += others * others, xy += own * others;
+  }
+  /// They fall where the others rise.
+  bool against() const {
+    constexpr double surely = -0.5;
+    const double of_both = (n * xx - x * x) * (n * yy - y * y);
+    return n >= least_samples && of_both > 0 && (n * xy - x * y) < surely * std::sqrt(of_both);
+  }
+};
+
 /// Points are eliminated, so each turn solves a system of the curves alone.
 class CurveFit {
  public:
@@ -100,10 +83,24 @@ class CurveFit {
       : sights_(std::move(sights.seen)),
         by_heldout_(std::move(sights.by_heldout)),
         heldout_(heldout),
+        reversed_(heldout.size()),
+        samples_(heldout.size()),
+        near_knot_(heldout.size()),
         curves_(heldout.size()) {
     for (GrayCurve& curve : curves_)
       for (std::size_t k = 0; k < curve_knots; ++k) curve[k] = level_of(k);
     before_ = weigh();
+    turn_reversed();
+    for (GrayCurve& knots : near_knot_) knots.fill(1e-3);
+    for (const auto* list : {&sights_, &by_heldout_})
+      for (const LevelSight& sight : *list)
+        for (const LevelSample& s : sight) {
+          const KnotPair at = knots_round(s.level);
+          const auto view = static_cast<std::size_t>(s.view);
+          near_knot_[view][at.knot] += 1 - at.above;
+          near_knot_[view][at.knot + 1] += at.above;
+          ++samples_[view];
+        }
   }
 
   void run() {
@@ -114,14 +111,31 @@ class CurveFit {
     }
     for (std::size_t v = 0; v < curves_.size(); ++v)
       if (heldout_[v]) follow(v);
-    for (GrayCurve& curve : curves_)  // a flat part tells nothing, a falling one is noise
-      for (std::size_t k = 1; k < curve_knots; ++k)
-        curve[k] = std::max(curve[k], curve[k - 1] + 0.02 * knot_step);
   }
 
-  const std::vector<GrayCurve>& curves() const { return curves_; }
+  /// Of the levels as the views store them.
+  std::vector<GrayCurve> curves() const {
+    std::vector<GrayCurve> stored = curves_;
+    for (std::size_t v = 0; v < stored.size(); ++v)
+      if (reversed_[v]) std::reverse(stored[v].begin(), stored[v].end());
+    return stored;
+  }
+  std::vector<std::size_t> reversed() const {
+    return views_where([&](std::size_t v) { return static_cast<bool>(reversed_[v]); });
+  }
+  std::vector<std::size_t> alone() const {
+    return views_where([&](std::size_t v) { return samples_[v] < least_samples; });
+  }
   double before() const { return before_; }
   double left() const { return left_; }
+
+  double variety() const {
+    std::vector<double> levels;
+    for (const LevelSight& sight : sights_) levels.push_back(own_of(sight));
+    const double middle = median(levels);
+    for (double& level : levels) level = std::abs(level - middle);
+    return median(levels);
+  }
 
   double spread() const {
     double squares = 0, count = 0;
@@ -136,6 +150,34 @@ class CurveFit {
  private:
   const GrayCurve& curve_of(const LevelSample& s) const {
     return curves_[static_cast<std::size_t>(s.view)];
+  }
+
+  template <class Asked>
+  std::vector<std::size_t> views_where(const Asked& asked) const {
+    std::vector<std::size_t> views;
+    for (std::size_t v = 0; v < curves_.size(); ++v)
+      if (asked(v)) views.push_back(v);
+    return views;
+  }
+
+  /// From here on their levels rise as the others' do.
+  void turn_reversed() {
+    std::vector<Together> together(curves_.size());
+    for (std::size_t p = 0; p < sights_.size(); ++p) {
+      double sum = 0;
+      for (const LevelSample& s : sights_[p]) sum += s.level;
+      const auto count = static_cast<double>(sights_[p].size());
+      for (const LevelSample& s : sights_[p])
+        together[static_cast<std::size_t>(s.view)].add(s.level, (sum - s.level) / (count - 1));
+      for (const LevelSample& s : by_heldout_[p])
+        together[static_cast<std::size_t>(s.view)].add(s.level, sum / count);
+    }
+    for (std::size_t v = 0; v < curves_.size(); ++v) reversed_[v] = together[v].against();
+    for (auto* list : {&sights_, &by_heldout_})
+      for (LevelSight& sight : *list)
+        for (LevelSample& s : sight)
+          if (reversed_[static_cast<std::size_t>(s.view)]) s.level = gray_levels - s.level;
+    weigh();
   }
 
   /// A curve is smooth, and near the view's own levels where nothing tells.
@@ -189,9 +231,10 @@ class CurveFit {
         normal.block<2, 2>(i, i) += of_s * of_s.transpose();
         right.segment<2>(i) += own_of(sights_[p]) * of_s;
       }
-    const Eigen::VectorXd solution = normal.ldlt().solve(right);
+    const Eigen::VectorXd solution = normal.llt().solve(right);
     for (std::size_t k = 0; k < curve_knots; ++k)
       curves_[view][k] = solution[static_cast<Eigen::Index>(k)];
+    make_rise(curves_[view], near_knot_[view]);
   }
 
   void solve() {
@@ -216,9 +259,10 @@ class CurveFit {
           normal.block<2, 2>(i, j) += both * of_s * of_o.transpose();
         }
     }
-    const Eigen::VectorXd solution = normal.ldlt().solve(right);
+    const Eigen::VectorXd solution = normal.llt().solve(right);
     for (std::size_t i = 0; i < curves_.size() * curve_knots; ++i)
       curves_[i / curve_knots][i % curve_knots] = solution[static_cast<Eigen::Index>(i)];
+    for (std::size_t v = 0; v < curves_.size(); ++v) make_rise(curves_[v], near_knot_[v]);
   }
 
   /// Weights fall with the square of the residual. Returns the median one.
@@ -238,28 +282,45 @@ class CurveFit {
   }
 
   std::vector<LevelSight> sights_, by_heldout_;
-  std::vector<bool> heldout_;
-  std::vector<GrayCurve> curves_;
+  std::vector<bool> heldout_, reversed_;
+  std::vector<std::size_t> samples_;  ///< of each view
+  std::vector<GrayCurve> near_knot_;  ///< of these, at each knot
+  std::vector<GrayCurve> curves_;     ///< of levels that rise in all views
   double before_ = 0, left_ = 0;
 };
 
-/// All curves together to 0..255.
-std::vector<GrayCurve> stretched(std::vector<GrayCurve> curves) {
-  double low = curves[0].front(), high = curves[0].back();
-  for (const GrayCurve& curve : curves) {
-    low = std::min(low, curve.front());
-    high = std::max(high, curve.back());
+/// All together so that what the training images show, but for a thousandth at either end, fills
+/// 0..255.
+void stretch(std::vector<GrayCurve>& curves, const Dataset& data,
+             const std::vector<bool>& heldout) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (std::size_t v = 0; v < curves.size(); ++v) {
+    std::vector<float> levels;
+    if (!heldout[v]) append_finite(data.views[v].image, levels);
+    if (levels.empty()) continue;
+    std::sort(levels.begin(), levels.end());
+    const std::size_t rare = levels.size() / 1000;
+    for (const float level : {levels[rare], levels[levels.size() - 1 - rare]}) {
+      const double common = common_level(curves[v], static_cast<double>(level));
+      low = std::min(low, common);
+      high = std::max(high, common);
+    }
   }
+  if (!(high > low)) return;
   for (GrayCurve& curve : curves)
     for (double& value : curve) value = gray_levels * (value - low) / (high - low);
-  return curves;
 }
 
 }  // namespace
 
 bool GrayCurves::told() const {
   constexpr double least_spread = 6;  // levels
-  return !of_view.empty() && spread > least_spread && left < 0.8 * before;
+  return !of_view.empty() && (!reversed.empty() || (spread > least_spread && left < 0.8 * before));
+}
+
+bool GrayCurves::contradict() const {
+  constexpr double noise = 4;  // levels
+  return !of_view.empty() && left > std::max(noise, 0.35 * variety);
 }
 
 GrayCurves estimate_gray_curves(const Dataset& dataset, const std::vector<DepthMap>& depth,
@@ -267,20 +328,26 @@ GrayCurves estimate_gray_curves(const Dataset& dataset, const std::vector<DepthM
   GrayCurves found;
   LevelSights sights = level_sights(dataset, depth, heldout);
   found.points = static_cast<int>(sights.seen.size());
-  if (found.points < least_sights) return found;
+  if (sights.seen.size() < least_sights) return found;
   CurveFit fit(std::move(sights), heldout);
   fit.run();
   found.before = fit.before();
   found.left = fit.left();
   found.spread = fit.spread();
-  found.of_view = stretched(fit.curves());
+  found.variety = fit.variety();
+  found.reversed = fit.reversed();
+  found.alone = fit.alone();
+  found.of_view = fit.curves();
+  stretch(found.of_view, dataset, heldout);
   return found;
 }
 
 cv::Mat to_common_levels(const cv::Mat& image, const GrayCurve& curve) {
   cv::Mat common = image.clone();
   for (float& v : cv::Mat_<float>(common))
-    if (std::isfinite(v)) v = static_cast<float>(common_level(curve, v));
+    if (std::isfinite(v))
+      v = static_cast<float>(
+          std::clamp(common_level(curve, static_cast<double>(v)), 0.0, gray_levels));
   return common;
 }
 

@@ -15,20 +15,27 @@ namespace orbitfuse::nerf {
 struct GrayCurves {
   std::vector<GrayCurve> of_view;  ///< empty where `points` are too few
   double spread = 0;               ///< RMS of how far samples move, levels of 255
-  double left = 0;                 ///< median disagreement of two views afterwards, levels
-  double before = 0;               ///< and before
-  int points = 0;                  ///< places of the maps that two views or more see
+  double left = 0;     ///< median of how far samples are from their points' levels afterwards
+  double before = 0;   ///< and before
+  double variety = 0;  ///< median of how far points' levels are from the median one, afterwards
+  int points = 0;      ///< places of the maps that two views or more see
+  std::vector<std::size_t> reversed;  ///< views that show hot as black where most show it white
+  /// Views that share too little with others: their curve says nothing.
+  std::vector<std::size_t> alone;
 
   /// Else images are better left as they are: of one span for all views, as some programs export
   /// them.
   bool told() const;
+  /// Views disagree, and no curves bring them together.
+  bool contradict() const;
 };
 
 /// From what the views that train see of the same points, as estimate_shading() finds them: each
-/// view's curve is linear between knots and smooth, curve(view, level) = a(point) by robust least
-/// squares, and the curves' mean is the identity. Views that share too few points keep a nearly
-/// straight one; views held out have no say, and follow the others. The common levels are stretched
-/// to 0..255. `depth`: of all views.
+/// view's curve is linear between knots, smooth and rising, curve(view, level) = a(point) by robust
+/// least squares, and the curves' mean is the identity. A view whose levels fall where the others'
+/// rise is turned first. Views held out have no say, and follow the others. What training images
+/// show (but for one pixel in a thousand at either end) is stretched to 0..255. `depth`: of all
+/// views.
 GrayCurves estimate_gray_curves(const Dataset& dataset, const std::vector<DepthMap>& depth,
                                 const std::vector<bool>& heldout);
 

@@ -7,15 +7,12 @@
 #include <cmath>
 #include <limits>
 
-#include "core/geometry/narrowed.hpp"
 #include "core/system/trace.hpp"
 #include "recon/nerf/device/on_device.hpp"
 #include "recon/nerf/field/checkpoint.hpp"
 #include "recon/nerf/rendering/render.hpp"
 #include "recon/nerf/training/exposure.hpp"
-#include "recon/nerf/training/gray_curves.hpp"
 #include "recon/nerf/training/measure.hpp"
-#include "recon/nerf/training/shading.hpp"
 
 namespace orbitfuse::nerf {
 namespace {
@@ -67,38 +64,6 @@ void report_exposure(const Exposure& exposure, const Dataset& dataset, TrainRepo
 
 bool dataset_has_kelvin(const Dataset& data) {
   return data.modality == Modality::thermal && !data.thermal_is_gray;
-}
-
-/// Else there is no one falloff.
-bool of_one_lens(const Dataset& data) {
-  constexpr double same = 0.05;  // focal lengths
-  const Camera& first = data.views[0].camera;
-  return std::all_of(data.views.begin(), data.views.end(), [&](const TrainingView& view) {
-    const Camera& c = view.camera;
-    return c.width == first.width && c.height == first.height &&
-           std::abs(c.fx - first.fx) < same * first.fx;
-  });
-}
-
-/// What the guide's surfaces are like from the views that are not left out.
-std::vector<DepthMap> depth_from(const FieldState& guide, const Dataset& data,
-                                 const std::vector<bool>& left_out) {
-  constexpr int width_px = 128;
-  RenderOptions coarse;
-  coarse.sample_factor = 0.5;
-  std::vector<DepthMap> maps;
-  for (std::size_t i = 0; i < data.views.size(); ++i) {
-    if (left_out[i]) continue;
-    const TrainingView& view = data.views[i];
-    DepthMap map;
-    map.view = static_cast<int>(i);
-    map.camera = narrowed_to(view.camera.without_distortion(), width_px);
-    map.depth =
-        render_strided(guide, ViewRays(map.camera, view.cam_from_world, guide.space), 1, coarse)
-            .depth;
-    maps.push_back(std::move(map));
-  }
-  return maps;
 }
 
 /// Whether held-out views at `psnr` end the run.
@@ -176,46 +141,6 @@ void TrainingRun::prepare_views_of_run() {
       state_->refined_poses.push_back(unmoved(view.cam_from_world));
     else
       views_[i].rays = ViewRays(view.camera, state_->refined_poses[i].pose(), state_->space);
-  }
-}
-
-void TrainingRun::even_shading(const Field* guide) {
-  const auto skip = [&](std::string why) {
-    report_.skips.push_back({"even shading", std::move(why), "images are used as they are"});
-  };
-  if (!options_.shared_geometry)
-    return skip("no visible field in the same frame says which points views share");
-  if (!of_one_lens(data_.training)) return skip("the views are of several lenses or sizes");
-  const Shading shading =
-      estimate_shading(data_.dataset, depth_from(guide->state(), data_.dataset, data_.heldout));
-  if (!std::isfinite(shading.sigma_k))
-    return skip(fmt::format("only {} places are seen by two views", shading.points));
-  if (!shading.told())
-    return skip(fmt::format("{:+.2f} +- {:.2f} K at the sides of the images, from {} places",
-                            shading.falloff_k, shading.sigma_k, shading.points));
-  report_.shading_k = shading.falloff_k;
-  const double per_kelvin = 1 / (state_->span.high - state_->span.low);
-  for (NormalisedView& view : views_)
-    view.target -= shading_image(shading.falloff_k * per_kelvin, view.target.size());
-}
-
-void TrainingRun::even_levels(const Field* guide) {
-  const auto skip = [&](std::string why) {
-    report_.skips.push_back({"even levels", std::move(why), "images are used as they are"});
-  };
-  if (!options_.shared_geometry)
-    return skip("no visible field in the same frame says which points views share");
-  const GrayCurves found = estimate_gray_curves(
-      data_.dataset,
-      depth_from(guide->state(), data_.dataset, std::vector<bool>(views_.size(), false)),
-      data_.heldout);
-  if (!found.told())
-    return skip(fmt::format("levels of {} shared places differ by {:.1f} of 255 in the median",
-                            found.points, found.before));
-  for (std::size_t i = 0; i < views_.size(); ++i) {
-    const TrainingView& view = data_.dataset.views[i];
-    report_.gray_curves[view.name] = found.of_view[i];
-    views_[i].target = normalised(to_common_levels(view.image, found.of_view[i]), state_->span);
   }
 }
 

@@ -44,7 +44,9 @@ void in_capture_order(std::vector<const FrameRecord*>& frames) {
 }  // namespace
 
 Result<OrbitFrames> orbit_frames(const std::vector<const FrameRecord*>& frames, int limit) {
-  const auto has_station = [](const FrameRecord& f) { return !f.tracking && f.station; };
+  const auto has_station = [](const FrameRecord& f) {
+    return !f.tracking && tells_azimuth(f.station);
+  };
   const auto is_view = [](const FrameRecord& f) { return !f.tracking; };
   const auto of = [&](const Lens& lens, const auto& asked) {
     std::vector<const FrameRecord*> list;
@@ -76,7 +78,7 @@ Result<OrbitFrames> orbit_frames(const std::vector<const FrameRecord*>& frames, 
     if (frame->tracking) continue;
     if (lens_key(*frame) != lens)
       orbit.left_out.emplace_back(frame->file, "it is of another camera or size than most views");
-    else if (declared && !frame->station)
+    else if (declared && !tells_azimuth(frame->station))
       orbit.left_out.emplace_back(frame->file, "it has no station, the others have");
   }
   return orbit;

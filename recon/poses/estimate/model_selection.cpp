@@ -6,12 +6,22 @@
 #include <utility>
 
 #include "recon/poses/sfm/held_matches.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
 
 /// Share of the views from which on a model that can't stand alone is worth completing.
 constexpr double part_of_a_model = 0.5;
+
+/// Whether its stations speak against a model. Most of its views looking from another side is an
+/// error of quality.
+bool against_stations(const Result<JudgedModel>& judged, const Session& session,
+                      const PoseOptions& options) {
+  if (!judged) return judged.error().kind == ErrorKind::quality;
+  const auto fit = fit_stations(judged->poses.reconstruction.views, session);
+  return fit && contradicted(*fit, options);
+}
 
 }  // namespace
 
@@ -27,6 +37,7 @@ bool ModelSelection::consider(const std::string& attempt, const std::string& fou
         judge_model(std::move(model), session_, frames_, level.options(), bundle);
     const bool contradicted = judged && judged->believed && matches_contradict(level, *judged);
     step.why += "; " + (judged ? judged->why : judged.error().found);
+    step.against_stations = against_stations(judged, session_, level.options());
     if (judged) step.posed = static_cast<int>(judged->poses.reconstruction.views.size());
     if (judged && judged->believed && (!best_ || better(judged->poses.reconstruction, best()))) {
       if (best_) steps_[best_step_].bettered = true;

@@ -74,6 +74,16 @@ TEST_F(Compare, ADryRunLooksAtBothRunsAndWritesNothing) {
   EXPECT_NE(compare("before", "after_session", {"--out", out.string(), "--dry-run"}).code, 0);
 }
 
+TEST_F(Compare, TwoRunsOfOneSessionCannotTellOfTheObject) {
+  const fs::path out = *folder / "same";
+  copy_results(made_run(), *folder / "again");
+  const char* said = "both runs are of one session";
+  EXPECT_THAT(compare("before", "again", {"--out", out.string(), "--dry-run"}).err,
+              HasSubstr(said));
+  EXPECT_THAT(compare("before", "after", {"--out", out.string(), "--dry-run"}).err,
+              testing::Not(HasSubstr(said)));
+}
+
 TEST_F(Compare, ScalesOfBothRunsAreOneOrNone) {
   const std::string before = (*folder / "before").string(), after = (*folder / "after").string();
   const auto tell = [&](const std::string& run, const std::string& metres) {

@@ -351,6 +351,12 @@ TEST_F(Run, JsonStreamIsOneObjectALineAndEndsWithTheResult) {
   EXPECT_GE(stages, 2);
 }
 
+TEST_F(Run, WhereNobodySeesABarItSaysWhatBegins) {
+  write_fixture_session(session, {.thermal = few_thermal});
+  EXPECT_NE(run({}, {}, "poses").err.find("poses_visible  starts: not done yet"),
+            std::string::npos);
+}
+
 TEST_F(Run, InterruptedTrainingResumesToTheSameField) {
   write_fixture_session(session);
   const std::vector<std::string> longer = {"--set", "train.visible.iterations=400", "--set",
@@ -358,6 +364,7 @@ TEST_F(Run, InterruptedTrainingResumesToTheSameField) {
   const Outcome stopped = run(longer, {.interrupt_after = "\"stage\":\"train.visible\""}, "train");
   if (stopped.code == 0) GTEST_SKIP() << "the training was over before the signal arrived";
   EXPECT_EQ(stopped.code, 130) << stopped.err;
+  EXPECT_EQ(stopped.err.find("failed"), std::string::npos) << stopped.err;
   EXPECT_FALSE(fs::exists(out / "train_visible"));
   EXPECT_TRUE(fs::exists(out / "poses_visible/stage.json"));
   auto resume = longer;

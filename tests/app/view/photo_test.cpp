@@ -12,8 +12,8 @@
 namespace orbitfuse::view {
 namespace {
 
-/// Kelvin of one pixel of a photo's only part.
-double kelvin_at(const std::string& body, int x, int y) {
+/// Kelvin, or the level, of one pixel of a photo's only part.
+double value_at(const std::string& body, int x, int y) {
   std::uint32_t length = 0;
   std::memcpy(&length, body.data(), 4);
   const auto part = nlohmann::json::parse(body.substr(4, length)).at("parts").at(0);
@@ -23,27 +23,48 @@ double kelvin_at(const std::string& body, int x, int y) {
   return count * part.at("scale").get<double>() + part.at("offset").get<double>();
 }
 
-// It lies beside a render of a field that is without its lens' shading, and measurements read it
-// so.
-TEST(Photo, ThermalOneIsWithoutItsLensShading) {
-  const orbitfuse::test::TempFolder folder;
+/// A run of one thermal view of 64x48 pixels, whose frame is "a" with this extension.
+FinishedRun run_of_one_view(const orbitfuse::test::TempFolder& folder, const char* extension) {
   FinishedRun run;
   run.session.emplace().folder = folder.path();
   FrameRecord& frame = run.session->frames.emplace_back();
   frame.modality = Modality::thermal;
-  frame.file = "a.tiff";
-  run.shading_k = -2;
-  ASSERT_TRUE(write_thermal_tiff(
-      folder.path() / frame.file,
-      cv::Mat(cv::Mat(48, 64, CV_32FC1, cv::Scalar(300)) + nerf::shading_image(-2, {64, 48})),
-      0.01));
+  frame.file = std::string("a") + extension;
   RecordedView view{Modality::thermal, {}, {}};
   view.view.name = frame.file;
   view.view.camera = Camera{64, 48, 60, 60, 32, 24};
   run.views.push_back(view);
+  return run;
+}
+
+// It lies beside a render of a field that is without its lens' shading, and measurements read it
+// so.
+TEST(Photo, ThermalOneIsWithoutItsLensShading) {
+  const orbitfuse::test::TempFolder folder;
+  FinishedRun run = run_of_one_view(folder, ".tiff");
+  run.shading_k = -2;
+  ASSERT_TRUE(write_thermal_tiff(
+      folder / "a.tiff",
+      cv::Mat(cv::Mat(48, 64, CV_32FC1, cv::Scalar(300)) + nerf::shading_image(-2, {64, 48})),
+      0.01));
   const auto shown = photo(run, 0);
   ASSERT_TRUE(shown) << shown.error().message();
-  for (const int x : {0, 32, 63}) EXPECT_NEAR(kelvin_at(*shown, x, 0), 300, 0.05) << x;
+  for (const int x : {0, 32, 63}) EXPECT_NEAR(value_at(*shown, x, 0), 300, 0.05) << x;
+}
+
+TEST(Photo, GrayOneHasTheLevelsThatTheFieldLearned) {
+  const orbitfuse::test::TempFolder folder;
+  FinishedRun run = run_of_one_view(folder, ".png");
+  run.thermal_is_gray = true;
+  ASSERT_TRUE(write_png(folder / "a.png", cv::Mat(48, 64, CV_8UC1, cv::Scalar(100))));
+  const auto level = [&] {
+    const auto shown = photo(run, 0);
+    EXPECT_TRUE(shown) << shown.error().message();
+    return value_at(*shown, 32, 24);
+  };
+  const double stored = level();
+  run.gray_curves["a.png"] = {0, 16, 32, 48, 64, 80, 96, 112, 127.5};
+  EXPECT_NEAR(level(), stored / 2, stored / 100);
 }
 
 }  // namespace

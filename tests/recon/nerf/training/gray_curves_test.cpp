@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <opencv2/imgproc.hpp>
 
 #include "tests/support/toy_scene.hpp"
 
@@ -48,17 +48,18 @@ GrayCurves curves_of(const Dataset& data, std::vector<bool> heldout = {}) {
   return estimate_gray_curves(data, test::toy_depth(data), heldout);
 }
 
-/// Median difference of two views' levels at the points of the first view's map that both show.
-double disagreement(const Dataset& data, const GrayCurves* curves) {
-  const auto depth = test::toy_depth(data);
-  std::vector<double> apart;
-  Dataset common = data;
+/// Median distance of samples from their points' mean levels, as a share of how far levels vary.
+double disagreement(Dataset data, const GrayCurves* curves) {
   if (curves != nullptr)
     for (std::size_t i = 0; i < data.views.size(); ++i)
-      common.views[i].image = to_common_levels(data.views[i].image, curves->of_view[i]);
-  const GrayCurves again =
-      estimate_gray_curves(common, depth, std::vector<bool>(data.views.size(), false));
-  return again.before;
+      data.views[i].image = to_common_levels(data.views[i].image, curves->of_view[i]);
+  double variance = 0;
+  for (const TrainingView& view : data.views) {
+    cv::Scalar mean, deviation;
+    cv::meanStdDev(view.image, mean, deviation);
+    variance += deviation[0] * deviation[0] / static_cast<double>(data.views.size());
+  }
+  return curves_of(data).before / std::sqrt(variance);
 }
 
 TEST(GrayCurves, BringViewsOfOtherGainsToOneScale) {
@@ -75,14 +76,59 @@ TEST(GrayCurves, BringBentCurvesToOneScale) {
   EXPECT_LT(disagreement(data, &found), 0.5 * disagreement(data, nullptr));
 }
 
-TEST(GrayCurves, RiseAndStayInRange) {
-  const GrayCurves found = curves_of(gray_scene(bent));
+TEST(GrayCurves, RiseAndFillTheRangeWithWhatThePicturesShow) {
+  // The last view's picture holds few levels, and steeply: its curve goes on beyond what any has.
+  const Dataset data = gray_scene([](std::size_t view, double value) {
+    return view + 1 == gray_views ? 0.4 + 0.2 * value : bent(view, value);
+  });
+  const GrayCurves found = curves_of(data);
   ASSERT_EQ(found.of_view.size(), static_cast<std::size_t>(gray_views));
-  for (const GrayCurve& curve : found.of_view) {
-    EXPECT_GE(curve.front(), -1e-6);
-    EXPECT_LE(curve.back(), 255 + 1e-6);
-    EXPECT_TRUE(std::is_sorted(curve.begin(), curve.end()));
+  double low = 255, high = 0;
+  for (std::size_t i = 0; i < found.of_view.size(); ++i) {
+    EXPECT_TRUE(std::is_sorted(found.of_view[i].begin(), found.of_view[i].end()));
+    double least = 0, most = 0;
+    cv::minMaxLoc(to_common_levels(data.views[i].image, found.of_view[i]), &least, &most);
+    EXPECT_TRUE(least >= 0 && most <= 255) << least << " " << most;
+    low = std::min(low, least), high = std::max(high, most);
   }
+  EXPECT_LT(low, 1);
+  EXPECT_GT(high, 254);
+}
+
+TEST(GrayCurves, BlackHotViewsAmongWhiteHotAreTurned) {
+  const auto mixed = [](std::size_t view, double value) {
+    const double level = gain_and_level(view, value);
+    return view == 2 || view == 7 ? 1 - level : level;
+  };
+  const Dataset data = gray_scene(mixed), white = gray_scene(gain_and_level);
+  for (const std::size_t heldout : {std::size_t{5}, std::size_t{7}}) {
+    std::vector<bool> apart(data.views.size(), false);
+    apart[heldout] = true;
+    const GrayCurves found = curves_of(data, apart);
+    ASSERT_TRUE(found.told());
+    EXPECT_EQ(found.reversed, (std::vector<std::size_t>{2, 7}));
+    EXPECT_LT(disagreement(data, &found), 0.35 * disagreement(white, nullptr));
+  }
+  EXPECT_TRUE(curves_of(white).reversed.empty());
+}
+
+TEST(GrayCurves, AViewThatSharesNothingIsNamed) {
+  Dataset data = gray_scene(gain_and_level);
+  data.views[4].image = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(curves_of(data).alone, std::vector<std::size_t>{4});
+}
+
+TEST(GrayCurves, LevelsThatNoCurveBringsTogetherAreSaidSo) {
+  Dataset data = gray_scene(gain_and_level);
+  EXPECT_FALSE(curves_of(data).contradict());
+  cv::RNG rng(5);  // each view's even patches have levels of their own
+  for (TrainingView& view : data.views) {
+    cv::Mat1f patches(6, 8);
+    rng.fill(patches, cv::RNG::UNIFORM, 20, 235);
+    cv::resize(patches, view.image, view.image.size(), 0, 0, cv::INTER_NEAREST);
+  }
+  const GrayCurves found = curves_of(data);
+  EXPECT_TRUE(found.contradict()) << found.points << " " << found.left << " " << found.variety;
 }
 
 TEST(GrayCurves, OfOneSpanAreLeftAlone) {
@@ -95,8 +141,8 @@ TEST(GrayCurves, HeldOutViewsFollowAndHaveNoSay) {
   std::vector<bool> heldout(data.views.size(), false);
   heldout[3] = heldout[8] = true;
   const GrayCurves found = curves_of(data, heldout);
-  Dataset spoilt = data;
-  spoilt.views[3].image = 128.0;
+  Dataset spoilt = data;  // few levels: the steepest of all curves
+  spoilt.views[3].image = 120 + 0.05 * spoilt.views[3].image;
   const GrayCurves other = curves_of(spoilt, heldout);
   ASSERT_TRUE(found.told() && other.told());
   for (std::size_t i = 0; i < data.views.size(); ++i)

@@ -204,6 +204,31 @@ TEST(Training, SharedGeometryStartsFromTheGuide) {
   EXPECT_NE(mismatch.error().message().find("nerf.levels"), std::string::npos);
 }
 
+TEST(Training, GrayViewsOfACameraOnAutomaticAreBroughtToOneScale) {
+  Field guide, field;
+  ASSERT_TRUE(train(toy_scene(Modality::visible, 12, 1, 96), toy_options(Modality::visible, 600),
+                    {}, guide));
+  Dataset gray = toy_scene(Modality::thermal, 12, 1, 96);
+  gray.thermal_is_gray = true;
+  for (std::size_t i = 0; i < gray.views.size(); ++i) {  // 290 to 305 K, with gains of their own
+    const double gain = 8 + 4 * std::sin(2.1 * static_cast<double>(i));
+    gray.views[i].image = (gray.views[i].image - 290) * gain + 30;
+  }
+  TrainOptions options = toy_options(Modality::thermal, 20);
+  options.shared_geometry = true;
+  const auto even = train(gray, options, {}, field, &guide);
+  ASSERT_TRUE(even) << even.error().message();
+  ASSERT_EQ(even->gray_curves.size(), gray.views.size());
+  // A view of twice the gain has half the slope.
+  const auto slope = [&](std::size_t i) {
+    const GrayCurve& curve = even->gray_curves.at(gray.views[i].name);
+    return curve[5] - curve[2];
+  };
+  EXPECT_GT(slope(2) / slope(1), 1.3);  // gains of 4.5 and 11.5
+  options.even_exposure = false;
+  EXPECT_TRUE(train(gray, options, {}, field, &guide)->gray_curves.empty());
+}
+
 TEST(Training, StopsAtATargetAndKeepsTheBestStep) {
   TrainOptions options = toy_options(Modality::visible, 400);
   options.holdout_every = 4;

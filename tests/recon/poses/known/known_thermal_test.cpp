@@ -114,6 +114,44 @@ TEST_F(KnownThermal, OneOfAnotherImageIsNamed) {
   EXPECT_EQ(poses->ladder.back().posed, static_cast<int>(poses->reconstruction.views.size()));
 }
 
+TEST_F(KnownThermal, WithoutPosesStationsThatThePhotosContradictLeaveTheOrderAlone) {
+  for (FrameRecord& frame : session_.frames) {
+    Station& station = frame.station.emplace();
+    station.index = static_cast<int>(frame.sequence);
+    station.azimuth_deg = 15.0 * station.index;  // of 30
+    station.azimuth_sigma_deg.reset(), station.elevation_sigma_deg.reset();
+  }
+  const auto truth = session_.frames;
+  for (FrameRecord& frame : session_.frames)
+    if (frame.modality == Modality::thermal) frame.cam_from_world.reset();
+  const auto poses = estimate();
+  ASSERT_TRUE(poses) << poses.error().message();
+  EXPECT_THAT(poses->warnings, ::testing::Contains(HasSubstr("order alone was used")));
+  EXPECT_GE(poses->reconstruction.views.size(), 10u);
+  for (const PosedView& view : poses->reconstruction.views) {
+    const auto frame = std::find_if(truth.begin(), truth.end(),
+                                    [&](const FrameRecord& f) { return f.file == view.name; });
+    EXPECT_LT((camera_center(view.cam_from_world) - camera_center(*frame->cam_from_world)).norm(),
+              0.15)
+        << view.name;
+  }
+}
+
+TEST_F(KnownThermal, ADeclaredRigWithoutPairsIsPosedApartWithAWord) {
+  session_.notes["rig"] = "yes";
+  for (FrameRecord& frame : session_.frames) {
+    if (frame.modality != Modality::thermal) continue;
+    frame.cam_from_world.reset();
+    const std::string stored = frame.file;  // a name without a number, which no photo has
+    frame.file = "thermal/" + std::string(frame.sequence + 1, 'x') + ".tiff";
+    std::filesystem::rename(folder_ / stored, folder_ / frame.file);
+  }
+  const auto poses = estimate();
+  ASSERT_TRUE(poses) << poses.error().message();
+  EXPECT_THAT(poses->warnings, ::testing::Contains(HasSubstr("are one rig, but neither names")));
+  EXPECT_FALSE(poses->ladder.front().held);
+}
+
 TEST_F(KnownThermal, RendersAreAskedForWhereTheyCanSayAnything) {
   EXPECT_TRUE(asks_for_renders(session_, options_));
   options_.check_known_poses = false;
