@@ -213,7 +213,7 @@ Result<StageOutput> score(const StageContext& context, const StageInputs& in) {
 pipeline::Stage metrics_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "metrics";
-  stage.version = 7;  // gray thermal frames
+  stage.version = 8;  // how much held-out frames explain
   stage.options = in.config->settings().to_json("metrics");
   stage.uses = {"poses_visible", "poses_thermal", "train_visible",
                 "train_thermal", "render",        "fuse"};

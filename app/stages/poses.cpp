@@ -134,9 +134,9 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 20;  // worlds of cameras that were held on their side
+  stage.version = 21;  // views aside of another even spacing than the declared one
   if (!visible) {
-    stage.version = 26;  // thermal images by rank
+    stage.version = 27;  // photos that contradict their stations
     stage.uses = {"poses_visible"};
     if (asks_for_renders(in.session->session, in.config->poses))
       stage.uses.push_back("train_visible");
@@ -148,6 +148,10 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   if (!visible)
     if (const std::string rig = described_rig(in.session->session); !rig.empty())
       stage.options["rig"] = rig;
+  if (!visible)
+    if (const std::string declared = declared_stations_of_photos(in.session->session);
+        !declared.empty())
+      stage.options["stations_of_photos"] = declared;
   stage.inputs_hash = in.session->content.at(modality);
   if (!in.session->has(modality))
     stage.pointless = fmt::format("the session has no {} frames", name(modality));

@@ -125,7 +125,7 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   pipeline::Stage stage;
   stage.name = "train_" + modality_name;
   // Thermal fields without a guide match their own depth: theirs rises with the depth stage's, too.
-  stage.version = visible ? 6 : 9;
+  stage.version = visible ? 6 : 10;
   stage.needs = {"poses_" + modality_name};
   stage.uses = {visible ? "depth" : "train_visible"};
   stage.options = in.config->settings().to_json("train." + modality_name);

@@ -138,4 +138,8 @@ bool asks_for_renders(const Session& session, const PoseOptions& options);
 /// estimate_thermal_poses() depends on it: "40 pairs by equal file names, declared"; "": no rig.
 std::string described_rig(const Session& session);
 
+/// The azimuths that the photos were declared with: where the photos contradict them, thermal
+/// frames are posed in their order alone. "": they have no declared stations.
+std::string declared_stations_of_photos(const Session& session);
+
 }  // namespace orbitfuse

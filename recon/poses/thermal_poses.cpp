@@ -76,30 +76,41 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
   return poses;
 }
 
-/// Who was wrong about the photos' stations was about these.
-bool stations_doubtful(const Session& session, const VisibleScene* visible,
-                       const PoseOptions& options) {
-  if (visible == nullptr || !have_declared_stations(session.frames_of(Modality::visible, false)) ||
-      !have_declared_stations(session.frames_of(Modality::thermal, false)))
-    return false;
+/// Where thermal frames were declared with the photos' stations and the photos contradict these:
+/// what their spacing is.
+std::optional<double> spacing_by_photos(const Session& session, const VisibleScene* visible,
+                                        const PoseOptions& options) {
+  const auto photos = session.frames_of(Modality::visible, false),
+             thermal = session.frames_of(Modality::thermal, false);
+  if (visible == nullptr || !have_declared_stations(photos) || !have_declared_stations(thermal) ||
+      station_spacing_deg(photos) != station_spacing_deg(thermal))
+    return std::nullopt;
   const auto fit = fit_stations(visible->reconstruction.views, session);
-  return fit && contradicted(*fit, options);
+  if (!fit || !contradicted(*fit, options)) return std::nullopt;
+  const auto even = even_spacing(visible->reconstruction.views, session);
+  return even ? std::optional(std::abs(even->spacing_deg)) : std::nullopt;
 }
 
-/// From the images, and from no stations that the photos' make doubtful, if that is enough.
+/// From the images, by the stations of the thermal frames; where the photos contradict these by the
+/// photos' spacing, or at last in their order alone.
 Result<ThermalPoses> from_images(const Session& session, const VisibleScene* visible,
                                  const PoseOptions& options, const std::filesystem::path& workdir,
                                  const Progress& progress, const std::vector<LadderStep>& steps) {
-  if (stations_doubtful(session, visible, options)) {
-    auto poses = estimated(in_order_alone(session, Modality::thermal), visible, options, workdir,
-                           progress, steps);
-    if (poses)
-      poses->warnings.push_back(
-          "the photos contradict the stations they were declared with: of the thermal frames the "
-          "order alone was used");
-    if (poses || poses.error().kind != ErrorKind::quality) return poses;
+  const auto spacing_deg = spacing_by_photos(session, visible, options);
+  if (!spacing_deg) return estimated(session, visible, options, workdir, progress, steps);
+  std::string used = fmt::format("the photos' own spacing, {:.1f} degrees,", *spacing_deg);
+  auto poses = estimated(at_spacing(session, Modality::thermal, *spacing_deg), visible, options,
+                         workdir, progress, steps);
+  if (!poses && poses.error().kind == ErrorKind::quality) {
+    used = "the order alone";
+    poses = estimated(in_order_alone(session, Modality::thermal), visible, options, workdir,
+                      progress, steps);
   }
-  return estimated(session, visible, options, workdir, progress, steps);
+  if (poses)
+    poses->warnings.push_back(
+        "the photos contradict the stations they were declared with: of the thermal frames " +
+        used + " was used");
+  return poses;
 }
 
 /// Known poses that nothing confirms and nothing can replace.
@@ -160,6 +171,15 @@ bool asks_for_renders(const Session& session, const PoseOptions& options) {
   });
   return options.check_known_poses && has_known_poses(session, Modality::visible) &&
          static_cast<std::size_t>(posed) >= least_views_to_judge;
+}
+
+std::string declared_stations_of_photos(const Session& session) {
+  const auto photos = session.frames_of(Modality::visible, false);
+  if (!have_declared_stations(photos)) return {};
+  std::string declared;
+  for (const FrameRecord* photo : photos)
+    declared += fmt::format("{:g} ", photo->station->azimuth_deg);
+  return declared;
 }
 
 std::string described_rig(const Session& session) {

@@ -33,17 +33,17 @@ void tell_side(ModalityPoses& poses) {
         100 * share));
 }
 
-/// Which views of a model that contradicts its declared stations stand where no spacing of even
-/// steps has them; nothing where the stations are right, or so many are that the model is wrong.
-std::optional<std::vector<std::string>> astray_of_another_spacing(
-    const std::vector<PosedView>& views, const Session& session, const PoseOptions& options) {
+/// The spacing of a model that contradicts its declared stations; nothing where these are right, or
+/// no spacing is.
+std::optional<EvenSpacing> another_spacing(const std::vector<PosedView>& views,
+                                           const Session& session, const PoseOptions& options) {
   const auto fit = fit_stations(views, session);
   if (!fit || !contradicted(*fit, options)) return std::nullopt;
-  auto astray = unevenly_spaced(views, session);
-  if (astray &&
-      static_cast<double>(astray->size()) > max_contradicting * static_cast<double>(views.size()))
+  auto even = even_spacing(views, session);
+  if (even && static_cast<double>(even->astray.size()) >
+                  max_contradicting * static_cast<double>(views.size()))
     return std::nullopt;
-  return astray;
+  return even;
 }
 
 /// A spacing that was declared wrongly contradicts every model that is right: none is believed, or
@@ -69,9 +69,9 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
                          options, workdir / "visible_in_order", progress, steps);
   if (!anew && anew.error().kind != ErrorKind::quality) return anew;
   for (std::size_t i = before; i < steps.size(); ++i) steps[i].attempt += ", in order alone";
-  const auto astray =
-      anew ? astray_of_another_spacing(anew->reconstruction.views, session, options) : std::nullopt;
-  if (!astray) {
+  const auto spacing =
+      anew ? another_spacing(anew->reconstruction.views, session, options) : std::nullopt;
+  if (!spacing) {
     for (std::size_t i = before; i < steps.size(); ++i) {
       if (steps[i].held) steps[i].why += "; no even spacing but the declared one explains it";
       steps[i].held = false;
@@ -81,12 +81,13 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
         "with any other even spacing, gave no model either";
     return poses;
   }
-  for (const std::string& name : *astray)
+  for (const std::string& name : spacing->astray)
     anew->doubtful.push_back({name, DoubtReason::off_its_loop,
                               "it stands aside of where the even spacing of the others has it"});
-  anew->warnings.push_back(
+  anew->warnings.push_back(fmt::format(
       "the photos contradict the stations they were declared with: they are posed in their order "
-      "alone; check --station-spacing-deg and --loops, or import without them");
+      "alone, {:.1f} degrees apart; import with --station-spacing-deg {:.0f}, or without stations",
+      std::abs(spacing->spacing_deg), std::abs(spacing->spacing_deg)));
   return anew;
 }
 

@@ -29,6 +29,20 @@ double robust_offset_deg(const std::vector<double>& differences) {
   return best;
 }
 
+/// Of the frames with a station, counted over all loops of their modality's stations, whether one
+/// was taken there or not.
+std::map<std::string, int> places_in_order(const Session& session) {
+  std::map<Modality, int> per_loop;
+  for (const FrameRecord& frame : session.frames)
+    if (!frame.tracking && frame.station)
+      per_loop[frame.modality] = std::max(per_loop[frame.modality], frame.station->index + 1);
+  std::map<std::string, int> places;
+  for (const FrameRecord& frame : session.frames)
+    if (!frame.tracking && frame.station)
+      places[frame.file] = frame.station->loop * per_loop[frame.modality] + frame.station->index;
+  return places;
+}
+
 }  // namespace
 
 bool all_have_stations(const std::vector<const FrameRecord*>& frames) {
@@ -142,53 +156,71 @@ std::optional<StationFit> fit_stations(const std::vector<PosedView>& views,
   return best;
 }
 
-std::optional<std::vector<std::string>> unevenly_spaced(const std::vector<PosedView>& views,
-                                                        const Session& session) {
+std::optional<EvenSpacing> even_spacing(const std::vector<PosedView>& views,
+                                        const Session& session) {
   // Spacings are tried round the usual one, for a degree of it is most of a step after a walk of
   // two loops.
   constexpr double astray_deg = 20, off_deg = 6, step_deg = 0.1;
-  std::map<std::string, const FrameRecord*> by_name;
-  std::map<Modality, int> per_loop;  // of all frames, whether they were posed or not
-  for (const FrameRecord& frame : session.frames) {
-    if (frame.tracking || !frame.station) continue;
-    by_name[frame.file] = &frame;
-    int& stations = per_loop[frame.modality];
-    stations = std::max(stations, frame.station->index + 1);
-  }
+  const std::map<std::string, int> place_of = places_in_order(session);
   struct Placed {
-    double place, azimuth_deg;
+    int place;
+    double azimuth_deg;
     std::string name;
   };
   std::vector<Placed> placed;
   const Similarity3d canonical = canonical_from_world(views, {});
   for (const PosedView& view : views)
-    if (const auto found = by_name.find(view.name); found != by_name.end()) {
-      const Station& station = *found->second->station;
-      placed.push_back(
-          {static_cast<double>(station.loop * per_loop[found->second->modality] + station.index),
-           orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg, view.name});
-    }
+    if (const auto place = place_of.find(view.name); place != place_of.end())
+      placed.push_back({place->second,
+                        orbit_angles(canonical * camera_center(view.cam_from_world)).azimuth_deg,
+                        view.name});
   if (placed.size() < 3) return std::nullopt;
   std::sort(placed.begin(), placed.end(),
             [](const Placed& a, const Placed& b) { return a.place < b.place; });
   std::vector<double> rates;
   for (std::size_t i = 1; i < placed.size(); ++i)
-    if (const double steps = placed[i].place - placed[i - 1].place; steps > 0)
+    if (const int steps = placed[i].place - placed[i - 1].place; steps > 0)
       rates.push_back(wrapped_deg(placed[i].azimuth_deg - placed[i - 1].azimuth_deg) / steps);
   if (rates.empty()) return std::nullopt;
   const double usual = median(rates);
-  std::optional<std::vector<std::string>> fewest;
+  std::optional<EvenSpacing> best;
+  double least_off = 0;
   for (double spacing = usual - off_deg; spacing <= usual + off_deg; spacing += step_deg) {
     std::vector<double> difference;
     for (const Placed& p : placed) difference.push_back(p.azimuth_deg - spacing * p.place);
     const double offset = robust_offset_deg(difference);
-    std::vector<std::string> astray;
-    for (std::size_t i = 0; i < placed.size(); ++i)
-      if (std::abs(wrapped_deg(difference[i] - offset)) > astray_deg)
-        astray.push_back(placed[i].name);
-    if (!fewest || astray.size() < fewest->size()) fewest = std::move(astray);
+    EvenSpacing even{spacing, {}};
+    double off = 0;
+    for (std::size_t i = 0; i < placed.size(); ++i) {
+      const double residual = std::abs(wrapped_deg(difference[i] - offset));
+      off += std::min(residual, astray_deg);
+      if (residual > astray_deg) even.astray.push_back(placed[i].name);
+    }
+    if (best && off >= least_off) continue;
+    least_off = off;
+    best = std::move(even);
   }
-  return fewest;
+  return best;
+}
+
+std::optional<double> station_spacing_deg(const std::vector<const FrameRecord*>& frames) {
+  for (const FrameRecord* frame : frames)
+    if (frame->station && frame->station->index > 0)
+      return frame->station->azimuth_deg / frame->station->index;
+  return std::nullopt;
+}
+
+Session at_spacing(Session session, Modality modality, double spacing_deg) {
+  const std::map<std::string, int> place_of = places_in_order(session);
+  const int per_loop = std::max(1, static_cast<int>(std::lround(360 / spacing_deg)));
+  for (FrameRecord& frame : session.frames) {
+    const auto place = place_of.find(frame.file);
+    if (frame.modality != modality || place == place_of.end()) continue;
+    frame.station->loop = place->second / per_loop;
+    frame.station->index = place->second % per_loop;
+    frame.station->azimuth_deg = frame.station->index * spacing_deg;
+  }
+  return session;
 }
 
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session) {

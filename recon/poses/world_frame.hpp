@@ -76,10 +76,22 @@ struct CaptureOrder {
 /// Only stations and tracking frames have an order that means something; steps = 0 for others.
 CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& session);
 
-/// The views of declared stations that stand more than 20 degrees from where even spacing round the
-/// orbit has them, so many degrees apart in the order of the stations, whatever these say. Of a
-/// model that merged front and back it is half the views. Nothing for fewer than three.
-std::optional<std::vector<std::string>> unevenly_spaced(const std::vector<PosedView>& views,
-                                                        const Session& session);
+/// Views that stand evenly round the orbit in the order of their stations, whatever azimuths these
+/// say.
+struct EvenSpacing {
+  double spacing_deg = 0;  ///< negative: clockwise
+  /// More than 20 degrees from where it has them. Of a model that merged front and back it is half
+  /// the views.
+  std::vector<std::string> astray;
+};
+/// The spacing that leaves the fewest astray; nothing for fewer than three views with stations.
+std::optional<EvenSpacing> even_spacing(const std::vector<PosedView>& views,
+                                        const Session& session);
+
+/// Between successive stations of a loop, as they say; nothing where no loop has two.
+std::optional<double> station_spacing_deg(const std::vector<const FrameRecord*>& frames);
+
+/// Stations of that modality in their order, but so far apart, in as many loops as that makes.
+Session at_spacing(Session session, Modality modality, double spacing_deg);
 
 }  // namespace orbitfuse

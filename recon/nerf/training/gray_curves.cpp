@@ -68,12 +68,14 @@ struct Together {
     ++n, x += own, y += others;
     xx += own * own, yy += others * others, xy += own * others;
   }
-  /// They fall where the others rise.
-  bool against() const {
-    constexpr double surely = -0.5;
+  /// 0 where too few tell.
+  double correlation() const {
     const double of_both = (n * xx - x * x) * (n * yy - y * y);
-    return n >= least_samples && of_both > 0 && (n * xy - x * y) < surely * std::sqrt(of_both);
+    return n >= least_samples && of_both > 0 ? (n * xy - x * y) / std::sqrt(of_both) : 0;
   }
+  /// They fall where the others rise (right ones of three scenes: .22 and more; turned ones, while
+  /// others were: -.37 and less).
+  bool against() const { return correlation() < -0.2; }
 };
 
 /// Points are eliminated, so each turn solves a system of the curves alone.
@@ -160,23 +162,45 @@ class CurveFit {
     return views;
   }
 
-  /// From here on their levels rise as the others' do.
-  void turn_reversed() {
-    std::vector<Together> together(curves_.size());
+  std::vector<Together> together() const {
+    std::vector<Together> views(curves_.size());
     for (std::size_t p = 0; p < sights_.size(); ++p) {
       double sum = 0;
       for (const LevelSample& s : sights_[p]) sum += s.level;
       const auto count = static_cast<double>(sights_[p].size());
       for (const LevelSample& s : sights_[p])
-        together[static_cast<std::size_t>(s.view)].add(s.level, (sum - s.level) / (count - 1));
+        views[static_cast<std::size_t>(s.view)].add(s.level, (sum - s.level) / (count - 1));
       for (const LevelSample& s : by_heldout_[p])
-        together[static_cast<std::size_t>(s.view)].add(s.level, sum / count);
+        views[static_cast<std::size_t>(s.view)].add(s.level, sum / count);
     }
-    for (std::size_t v = 0; v < curves_.size(); ++v) reversed_[v] = together[v].against();
+    return views;
+  }
+
+  void turn(std::size_t view) {
+    reversed_[view] = !reversed_[view];
     for (auto* list : {&sights_, &by_heldout_})
       for (LevelSight& sight : *list)
         for (LevelSample& s : sight)
-          if (reversed_[static_cast<std::size_t>(s.view)]) s.level = gray_levels - s.level;
+          if (static_cast<std::size_t>(s.view) == view) s.level = gray_levels - s.level;
+  }
+
+  /// One after the other, the one that is most against the rest first: a second one makes the rest
+  /// less sure. From here on all levels rise together.
+  void turn_reversed() {
+    const auto views =
+        static_cast<std::size_t>(std::count(heldout_.begin(), heldout_.end(), false));
+    for (std::size_t turned = 0; 2 * turned < views; ++turned) {
+      const std::vector<Together> all = together();
+      std::size_t most = 0;
+      for (std::size_t v = 0; v < all.size(); ++v)
+        if (!heldout_[v] && (heldout_[most] || all[v].correlation() < all[most].correlation()))
+          most = v;
+      if (!all[most].against()) break;
+      turn(most);
+    }
+    const std::vector<Together> all = together();
+    for (std::size_t v = 0; v < all.size(); ++v)
+      if (heldout_[v] && all[v].against()) turn(v);
     weigh();
   }
 

@@ -98,15 +98,15 @@ TEST(GrayCurves, RiseAndFillTheRangeWithWhatThePicturesShow) {
 TEST(GrayCurves, BlackHotViewsAmongWhiteHotAreTurned) {
   const auto mixed = [](std::size_t view, double value) {
     const double level = gain_and_level(view, value);
-    return view == 2 || view == 7 ? 1 - level : level;
+    return view % 3 == 1 ? 1 - level : level;
   };
   const Dataset data = gray_scene(mixed), white = gray_scene(gain_and_level);
-  for (const std::size_t heldout : {std::size_t{5}, std::size_t{7}}) {
+  for (const std::size_t heldout : {std::size_t{5}, std::size_t{7}}) {  // one of either kind
     std::vector<bool> apart(data.views.size(), false);
     apart[heldout] = true;
     const GrayCurves found = curves_of(data, apart);
     ASSERT_TRUE(found.told());
-    EXPECT_EQ(found.reversed, (std::vector<std::size_t>{2, 7}));
+    EXPECT_EQ(found.reversed, (std::vector<std::size_t>{1, 4, 7, 10}));
     EXPECT_LT(disagreement(data, &found), 0.35 * disagreement(white, nullptr));
   }
   EXPECT_TRUE(curves_of(white).reversed.empty());

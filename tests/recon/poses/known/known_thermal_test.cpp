@@ -114,7 +114,7 @@ TEST_F(KnownThermal, OneOfAnotherImageIsNamed) {
   EXPECT_EQ(poses->ladder.back().posed, static_cast<int>(poses->reconstruction.views.size()));
 }
 
-TEST_F(KnownThermal, WithoutPosesStationsThatThePhotosContradictLeaveTheOrderAlone) {
+TEST_F(KnownThermal, WithoutPosesStationsThatThePhotosContradictGetThePhotosSpacing) {
   for (FrameRecord& frame : session_.frames) {
     Station& station = frame.station.emplace();
     station.index = static_cast<int>(frame.sequence);
@@ -126,7 +126,7 @@ TEST_F(KnownThermal, WithoutPosesStationsThatThePhotosContradictLeaveTheOrderAlo
     if (frame.modality == Modality::thermal) frame.cam_from_world.reset();
   const auto poses = estimate();
   ASSERT_TRUE(poses) << poses.error().message();
-  EXPECT_THAT(poses->warnings, ::testing::Contains(HasSubstr("order alone was used")));
+  EXPECT_THAT(poses->warnings, ::testing::Contains(HasSubstr("the photos' own spacing, 30.")));
   EXPECT_GE(poses->reconstruction.views.size(), 10u);
   for (const PosedView& view : poses->reconstruction.views) {
     const auto frame = std::find_if(truth.begin(), truth.end(),

@@ -140,7 +140,7 @@ TEST(OrbitGates, AnotherSpacingIsEvenAndAFoldIsNot) {
     // Upright and broad photos are counted each from 0, as those of two cameras.
     frame.sequence = i / 2;
   }
-  const auto astray = [&](const auto& azimuth_of) {
+  const auto even = [&](const auto& azimuth_of) {
     ModalityPoses poses;
     for (std::size_t i = 0; i < session.frames.size(); ++i) {
       OrbitPose pose;
@@ -151,16 +151,40 @@ TEST(OrbitGates, AnotherSpacingIsEvenAndAFoldIsNot) {
       poses.reconstruction.views.push_back(
           {session.frames[i].file, camera, cam_from_world_of(pose, camera)});
     }
-    return unevenly_spaced(poses.reconstruction.views, session).value();
+    return even_spacing(poses.reconstruction.views, session).value();
   };
+  const auto astray = [&](const auto& azimuth_of) { return even(azimuth_of).astray; };
   EXPECT_TRUE(astray(as_taken).empty());
-  EXPECT_TRUE(astray([](double a) { return -as_taken(a); }).empty()) << "walked the other way";
+  EXPECT_NEAR(even(as_taken).spacing_deg, 30, 0.3);
+  const EvenSpacing back = even([](double a) { return -as_taken(a); });
+  EXPECT_TRUE(back.astray.empty()) << "walked the other way";
+  EXPECT_NEAR(back.spacing_deg, -30, 0.3);
   const std::size_t many = static_cast<std::size_t>(max_contradicting * 24) + 1;
   EXPECT_GE(astray(front_on_back).size(), many);
   EXPECT_GE(astray(mirrored_back).size(), many);
   EXPECT_GE(astray([](double a) { return std::fmod(a, 90); }).size(), many);
   const auto one_folded = astray([](double a) { return a == 60 ? a + 180 : a; });
   EXPECT_EQ(one_folded, (std::vector{session.frames[2].file, session.frames[14].file}));
+}
+
+TEST(OrbitGates, StationsAtAnotherSpacingMakeTheLoopsThatItMakes) {
+  Session session = tracking_session(24);
+  for (std::size_t i = 0; i < session.frames.size(); ++i) {
+    session.frames[i].tracking = false;
+    Station& station = session.frames[i].station.emplace();
+    station.loop = static_cast<int>(i / 18), station.index = static_cast<int>(i % 18);
+    station.azimuth_deg = 20 * station.index;
+  }
+  const auto frames = session.frames_of(Modality::thermal);
+  EXPECT_DOUBLE_EQ(station_spacing_deg(frames).value(), 20);
+  EXPECT_FALSE(station_spacing_deg({frames[0]}));
+  const Session respaced = at_spacing(session, Modality::thermal, 29.9);
+  for (std::size_t i = 0; i < 24; ++i) {
+    EXPECT_EQ(respaced.frames[i].station->loop, static_cast<int>(i / 12));
+    EXPECT_DOUBLE_EQ(respaced.frames[i].station->azimuth_deg, 29.9 * static_cast<double>(i % 12));
+  }
+  EXPECT_EQ(at_spacing(session, Modality::visible, 29.9).frames[5].station->azimuth_deg, 100)
+      << "the other modality keeps its own";
 }
 
 TEST(OrbitGates, APartOfTheFramesIsNotEnough) {
