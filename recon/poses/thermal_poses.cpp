@@ -98,7 +98,7 @@ Result<ThermalPoses> from_images(const Session& session, const VisibleScene* vis
                                  const Progress& progress, const std::vector<LadderStep>& steps) {
   const auto spacing_deg = spacing_by_photos(session, visible, options);
   if (!spacing_deg) return estimated(session, visible, options, workdir, progress, steps);
-  std::string used = fmt::format("the photos' own spacing, {:.1f} degrees,", *spacing_deg);
+  std::string used = fmt::format("the photos' own spacing, {:.4g} degrees,", *spacing_deg);
   auto poses = estimated(at_spacing(session, Modality::thermal, *spacing_deg), visible, options,
                          workdir, progress, steps);
   if (!poses && poses.error().kind == ErrorKind::quality) {

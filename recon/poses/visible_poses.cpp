@@ -86,8 +86,9 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
                               "it stands aside of where the even spacing of the others has it"});
   anew->warnings.push_back(fmt::format(
       "the photos contradict the stations they were declared with: they are posed in their order "
-      "alone, {:.1f} degrees apart; import with --station-spacing-deg {:.0f}, or without stations",
-      std::abs(spacing->spacing_deg), std::abs(spacing->spacing_deg)));
+      "alone, {0:.4g} degrees apart; import with --station-spacing-deg {0:.4g}, or without "
+      "stations",
+      std::abs(spacing->spacing_deg)));
   return anew;
 }
 

@@ -200,6 +200,12 @@ std::optional<EvenSpacing> even_spacing(const std::vector<PosedView>& views,
     least_off = off;
     best = std::move(even);
   }
+  // A loop that begins a little aside of the one before bends the slope through both.
+  constexpr double near = 0.05;
+  const double stations = std::round(360 / best->spacing_deg);
+  if (stations != 0 &&
+      std::abs(360 / stations - best->spacing_deg) < near * std::abs(best->spacing_deg))
+    best->spacing_deg = 360 / stations;
   return best;
 }
 
