@@ -18,6 +18,7 @@ WITHOUT_PLOT = {
     "input/gray.md": "a few scenes, two figures each",
     "input/known_poses.md": "mistakes that are seen or not",
     "input/mirrored.md": "refused or not",
+    "input/stations.md": "placed or not",
     "input/turned.md": "placed or not",
     "run_real.md": "what came of four recordings, without truth",
     "stability.md": "cases that hold or don't",
