@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "recon/poses/cross_modal/cross_modal.hpp"
 #include "recon/poses/known/scene_check.hpp"
@@ -76,18 +77,22 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
   return poses;
 }
 
-/// Where thermal frames were declared with the photos' stations and the photos contradict these:
-/// what their spacing is.
-std::optional<double> spacing_by_photos(const Session& session, const VisibleScene* visible,
-                                        const PoseOptions& options) {
-  const auto photos = session.frames_of(Modality::visible, false),
-             thermal = session.frames_of(Modality::thermal, false);
-  if (visible == nullptr || !have_declared_stations(photos) || !have_declared_stations(thermal) ||
-      station_spacing_deg(photos) != station_spacing_deg(thermal))
-    return std::nullopt;
-  const auto fit = fit_stations(visible->reconstruction.views, session);
-  if (!fit || !contradicted(*fit, options)) return std::nullopt;
-  const auto even = even_spacing(visible->reconstruction.views, session);
+/// Who was wrong about the photos' stations was about these.
+bool stations_doubtful(const Session& session, const VisibleScene* visible,
+                       const PoseOptions& options) {
+  return visible != nullptr &&
+         have_declared_stations(session.frames_of(Modality::visible, false)) &&
+         have_declared_stations(session.frames_of(Modality::thermal, false)) &&
+         stations_contradict(visible->reconstruction.views, session, options);
+}
+
+/// What the posed photos' spacing is, where thermal frames were declared with the photos' own.
+std::optional<double> spacing_by_photos(const Session& session, const VisibleScene& visible) {
+  constexpr double alike = 1e-6;
+  const auto photos = station_spacing_deg(session.frames_of(Modality::visible, false)),
+             thermal = station_spacing_deg(session.frames_of(Modality::thermal, false));
+  if (!photos || !thermal || !(std::abs(*photos - *thermal) < alike * *photos)) return std::nullopt;
+  const auto even = spacing_of(visible.reconstruction.views, session);
   return even ? std::optional(std::abs(even->spacing_deg)) : std::nullopt;
 }
 
@@ -96,21 +101,25 @@ std::optional<double> spacing_by_photos(const Session& session, const VisibleSce
 Result<ThermalPoses> from_images(const Session& session, const VisibleScene* visible,
                                  const PoseOptions& options, const std::filesystem::path& workdir,
                                  const Progress& progress, const std::vector<LadderStep>& steps) {
-  const auto spacing_deg = spacing_by_photos(session, visible, options);
-  if (!spacing_deg) return estimated(session, visible, options, workdir, progress, steps);
-  std::string used = fmt::format("the photos' own spacing, {:.4g} degrees,", *spacing_deg);
-  auto poses = estimated(at_spacing(session, Modality::thermal, *spacing_deg), visible, options,
-                         workdir, progress, steps);
-  if (!poses && poses.error().kind == ErrorKind::quality) {
-    used = "the order alone";
-    poses = estimated(in_order_alone(session, Modality::thermal), visible, options, workdir,
-                      progress, steps);
+  if (!stations_doubtful(session, visible, options))
+    return estimated(session, visible, options, workdir, progress, steps);
+  const auto said = [](Result<ThermalPoses> poses, const std::string& used) {
+    if (poses)
+      poses->warnings.push_back(
+          "the photos contradict the stations they were declared with: of the thermal frames " +
+          used + " was used");
+    return poses;
+  };
+  if (const auto spacing_deg = spacing_by_photos(session, *visible)) {
+    auto poses = estimated(at_spacing(session, Modality::thermal, *spacing_deg), visible, options,
+                           workdir / "spacing", progress, steps);
+    if (poses || poses.error().kind != ErrorKind::quality)
+      return said(std::move(poses),
+                  fmt::format("the photos' own spacing, {:.4g} degrees,", *spacing_deg));
   }
-  if (poses)
-    poses->warnings.push_back(
-        "the photos contradict the stations they were declared with: of the thermal frames " +
-        used + " was used");
-  return poses;
+  return said(estimated(in_order_alone(session, Modality::thermal), visible, options, workdir,
+                        progress, steps),
+              "the order alone");
 }
 
 /// Known poses that nothing confirms and nothing can replace.

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/geometry/level_cameras.hpp"
 #include "recon/poses/estimate/visible_ladder.hpp"
@@ -33,19 +34,6 @@ void tell_side(ModalityPoses& poses) {
         100 * share));
 }
 
-/// The spacing of a model that contradicts its declared stations; nothing where these are right, or
-/// no spacing is.
-std::optional<EvenSpacing> another_spacing(const std::vector<PosedView>& views,
-                                           const Session& session, const PoseOptions& options) {
-  const auto fit = fit_stations(views, session);
-  if (!fit || !contradicted(*fit, options)) return std::nullopt;
-  auto even = even_spacing(views, session);
-  if (even && static_cast<double>(even->astray.size()) >
-                  max_contradicting * static_cast<double>(views.size()))
-    return std::nullopt;
-  return even;
-}
-
 /// A spacing that was declared wrongly contradicts every model that is right: none is believed, or
 /// most views are missing. Then the photos are posed in the order they were taken in alone, which a
 /// model must keep, and which counts where another even spacing explains it.
@@ -69,11 +57,18 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
                          options, workdir / "visible_in_order", progress, steps);
   if (!anew && anew.error().kind != ErrorKind::quality) return anew;
   for (std::size_t i = before; i < steps.size(); ++i) steps[i].attempt += ", in order alone";
-  const auto spacing =
-      anew ? another_spacing(anew->reconstruction.views, session, options) : std::nullopt;
+  std::optional<EvenSpacing> spacing;
+  if (anew) {
+    const std::vector<PosedView>& views = anew->reconstruction.views;
+    const auto fit = fit_stations(views, session);
+    if (fit && contradicted(*fit, options))
+      spacing = spacing_of(views, session);
+    else if (fit && fit->folded.empty())
+      return anew;  // a model of the declared stations, after all
+  }
   if (!spacing) {
     for (std::size_t i = before; i < steps.size(); ++i) {
-      if (steps[i].held) steps[i].why += "; no even spacing but the declared one explains it";
+      if (steps[i].held) steps[i].why += "; no other even spacing explains it";
       steps[i].held = false;
     }
     poses.error().remedy +=

@@ -33,9 +33,15 @@ double robust_offset_deg(const std::vector<double>& differences) {
 /// was taken there or not.
 std::map<std::string, int> places_in_order(const Session& session) {
   std::map<Modality, int> per_loop;
-  for (const FrameRecord& frame : session.frames)
-    if (!frame.tracking && frame.station)
-      per_loop[frame.modality] = std::max(per_loop[frame.modality], frame.station->index + 1);
+  for (const FrameRecord& frame : session.frames) {
+    if (frame.tracking || !frame.station) continue;
+    int& stations = per_loop[frame.modality];
+    const int index = frame.station->index;
+    stations = std::max(stations, index + 1);
+    const double spacing_deg = index > 0 ? frame.station->azimuth_deg / index : 0;
+    if (spacing_deg > 0)
+      stations = std::max(stations, static_cast<int>(std::lround(360 / spacing_deg)));
+  }
   std::map<std::string, int> places;
   for (const FrameRecord& frame : session.frames)
     if (!frame.tracking && frame.station)
@@ -183,30 +189,32 @@ std::optional<EvenSpacing> even_spacing(const std::vector<PosedView>& views,
       rates.push_back(wrapped_deg(placed[i].azimuth_deg - placed[i - 1].azimuth_deg) / steps);
   if (rates.empty()) return std::nullopt;
   const double usual = median(rates);
-  std::optional<EvenSpacing> best;
-  double least_off = 0;
-  for (double spacing = usual - off_deg; spacing <= usual + off_deg; spacing += step_deg) {
+  struct Tried {
+    EvenSpacing even;
+    double off = 0;  ///< summed, each at most as much as makes one astray
+  };
+  const auto tried = [&](double spacing_deg) {
     std::vector<double> difference;
-    for (const Placed& p : placed) difference.push_back(p.azimuth_deg - spacing * p.place);
+    for (const Placed& p : placed) difference.push_back(p.azimuth_deg - spacing_deg * p.place);
     const double offset = robust_offset_deg(difference);
-    EvenSpacing even{spacing, {}};
-    double off = 0;
+    Tried result{{spacing_deg, {}}, 0};
     for (std::size_t i = 0; i < placed.size(); ++i) {
       const double residual = std::abs(wrapped_deg(difference[i] - offset));
-      off += std::min(residual, astray_deg);
-      if (residual > astray_deg) even.astray.push_back(placed[i].name);
+      result.off += std::min(residual, astray_deg);
+      if (residual > astray_deg) result.even.astray.push_back(placed[i].name);
     }
-    if (best && off >= least_off) continue;
-    least_off = off;
-    best = std::move(even);
-  }
-  // A loop that begins a little aside of the one before bends the slope through both.
-  constexpr double near = 0.05;
-  const double stations = std::round(360 / best->spacing_deg);
-  if (stations != 0 &&
-      std::abs(360 / stations - best->spacing_deg) < near * std::abs(best->spacing_deg))
-    best->spacing_deg = 360 / stations;
-  return best;
+    return result;
+  };
+  Tried best = tried(usual);
+  for (double spacing = usual - off_deg; spacing <= usual + off_deg; spacing += step_deg)
+    if (Tried other = tried(spacing); other.off < best.off) best = std::move(other);
+  // A loop that begins aside of the one before bends the slope through both, but no step.
+  const double stations = std::round(360 / best.even.spacing_deg);
+  if (std::isfinite(stations) && stations != 0 &&
+      std::abs(360 / stations - usual) < std::abs(best.even.spacing_deg - usual))
+    if (Tried closed = tried(360 / stations); closed.even.astray.size() <= best.even.astray.size())
+      best = std::move(closed);
+  return best.even;
 }
 
 std::optional<double> station_spacing_deg(const std::vector<const FrameRecord*>& frames) {

@@ -79,7 +79,7 @@ CaptureOrder capture_order(const std::vector<PosedView>& views, const Session& s
 /// Views that stand evenly round the orbit in the order of their stations, whatever azimuths these
 /// say.
 struct EvenSpacing {
-  /// Negative: clockwise. That of a closed loop where one is as near as 5 %.
+  /// Negative: clockwise. That of a closed loop where one is nearer to the usual step.
   double spacing_deg = 0;
   /// More than 20 degrees from where it has them. Of a model that merged front and back it is half
   /// the views.

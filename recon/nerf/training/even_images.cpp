@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/first_names.hpp"
 #include "core/geometry/narrowed.hpp"
 #include "recon/nerf/rendering/render.hpp"
@@ -102,15 +105,21 @@ void TrainingRun::even_levels(const Field* guide) {
   if (found.of_view.empty())
     return skip(fmt::format("only {} places are seen by two views", found.points));
   tell_of(found, data_.dataset, report_.warnings);
-  if (!found.told())
-    return skip(
-        fmt::format("levels of {} shared places are {:.1f} of 255 from their mean in the median",
-                    found.points, found.before));
-  for (std::size_t i = 0; i < views_.size(); ++i) {
+  const auto bring = [&](std::size_t i, const GrayCurve& curve) {
     const TrainingView& view = data_.dataset.views[i];
-    report_.gray_curves[view.name] = found.of_view[i];
-    views_[i].target = normalised(to_common_levels(view.image, found.of_view[i]), state_->span);
+    report_.gray_curves[view.name] = curve;
+    views_[i].target = normalised(to_common_levels(view.image, curve), state_->span);
+  };
+  if (found.told()) {
+    for (std::size_t i = 0; i < views_.size(); ++i) bring(i, found.of_view[i]);
+    return;
   }
+  GrayCurve turned;
+  for (std::size_t k = 0; k < turned.size(); ++k)
+    turned[k] = 255.0 * (1 - static_cast<double>(k) / static_cast<double>(turned.size() - 1));
+  for (const std::size_t heldout : found.reversed) bring(heldout, turned);
+  skip(fmt::format("levels of {} shared places are {:.1f} of 255 from their mean in the median",
+                   found.points, found.before));
 }
 
 }  // namespace orbitfuse::nerf

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "core/image/samples.hpp"
 #include "core/numeric/median.hpp"
@@ -189,14 +190,15 @@ class CurveFit {
   void turn_reversed() {
     const auto views =
         static_cast<std::size_t>(std::count(heldout_.begin(), heldout_.end(), false));
-    for (std::size_t turned = 0; 2 * turned < views; ++turned) {
+    for (std::size_t turned = 0; 2 * (turned + 1) < views; ++turned) {
       const std::vector<Together> all = together();
-      std::size_t most = 0;
+      std::optional<std::size_t> most;
       for (std::size_t v = 0; v < all.size(); ++v)
-        if (!heldout_[v] && (heldout_[most] || all[v].correlation() < all[most].correlation()))
+        if (!heldout_[v] && !reversed_[v] && all[v].against() &&
+            (!most || all[v].correlation() < all[*most].correlation()))
           most = v;
-      if (!all[most].against()) break;
-      turn(most);
+      if (!most) break;
+      turn(*most);
     }
     const std::vector<Together> all = together();
     for (std::size_t v = 0; v < all.size(); ++v)
@@ -339,7 +341,7 @@ void stretch(std::vector<GrayCurve>& curves, const Dataset& data,
 
 bool GrayCurves::told() const {
   constexpr double least_spread = 6;  // levels
-  return !of_view.empty() && (!reversed.empty() || (spread > least_spread && left < 0.8 * before));
+  return !of_view.empty() && (training_reversed || (spread > least_spread && left < 0.8 * before));
 }
 
 bool GrayCurves::contradict() const {
@@ -360,6 +362,8 @@ GrayCurves estimate_gray_curves(const Dataset& dataset, const std::vector<DepthM
   found.spread = fit.spread();
   found.variety = fit.variety();
   found.reversed = fit.reversed();
+  found.training_reversed = std::any_of(found.reversed.begin(), found.reversed.end(),
+                                        [&](std::size_t view) { return !heldout[view]; });
   found.alone = fit.alone();
   found.of_view = fit.curves();
   stretch(found.of_view, dataset, heldout);

@@ -20,6 +20,7 @@ struct GrayCurves {
   double variety = 0;  ///< median of how far points' levels are from the median one, afterwards
   int points = 0;      ///< places of the maps that two views or more see
   std::vector<std::size_t> reversed;  ///< views that show hot as black where most show it white
+  bool training_reversed = false;     ///< one of these trains
   /// Views that share too little with others: their curve says nothing.
   std::vector<std::size_t> alone;
 

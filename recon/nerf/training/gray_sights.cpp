@@ -15,12 +15,12 @@ namespace {
 
 constexpr double least_gray = 2, most_gray = 253;  ///< beyond, a camera clipped what it saw
 constexpr float gray_edge = 40;                    ///< range of 5x5 pixels: beyond, poses decide
-constexpr int least_step_px = 3;                   ///< between the points of a depth map
-constexpr double most_places = 33000;
+constexpr int least_sight_step_px = 3;             ///< between the points of a depth map
+constexpr double most_sights = 33000;
 constexpr std::size_t most_askers = 24;
 
-std::optional<LevelSample> seen_by(const Dataset& data, const DepthMap& map,
-                                   const Eigen::Vector3d& world) {
+std::optional<LevelSample> level_seen_by(const Dataset& data, const DepthMap& map,
+                                         const Eigen::Vector3d& world) {
   const TrainingView& view = data.views[static_cast<std::size_t>(map.view)];
   const Eigen::Vector3d p = view.cam_from_world * world;
   if (!confirms(map, p) || !lens_holds(view.camera, p)) return std::nullopt;
@@ -41,7 +41,7 @@ LevelSights level_sights(const Dataset& data, const std::vector<DepthMap>& depth
     if (trains) pixels += static_cast<double>(map.depth.total());
   }
   const int step =
-      std::max(least_step_px, static_cast<int>(std::ceil(std::sqrt(pixels / most_places))));
+      std::max(least_sight_step_px, static_cast<int>(std::ceil(std::sqrt(pixels / most_sights))));
   const std::size_t asked = std::min(training.size(), most_askers);
   LevelSights sights;
   for (std::size_t own = 0; own < training.size(); ++own) {
@@ -54,12 +54,12 @@ LevelSights level_sights(const Dataset& data, const std::vector<DepthMap>& depth
         const Eigen::Vector3d world = world_from_cam * lifted(map.depth, map.camera, x, y);
         LevelSight sight, by_heldout;
         for (std::size_t k = 0; k < asked; ++k)
-          if (const auto sample = seen_by(
+          if (const auto sample = level_seen_by(
                   data, *training[(own + k * training.size() / asked) % training.size()], world))
             sight.push_back(*sample);
         if (sight.size() < 2) continue;
         for (const DepthMap* other : apart)
-          if (const auto sample = seen_by(data, *other, world)) by_heldout.push_back(*sample);
+          if (const auto sample = level_seen_by(data, *other, world)) by_heldout.push_back(*sample);
         sights.seen.push_back(std::move(sight));
         sights.by_heldout.push_back(std::move(by_heldout));
       }

@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "recon/poses/sfm/held_matches.hpp"
-#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -19,8 +18,7 @@ constexpr double part_of_a_model = 0.5;
 bool against_stations(const Result<JudgedModel>& judged, const Session& session,
                       const PoseOptions& options) {
   if (!judged) return judged.error().kind == ErrorKind::quality;
-  const auto fit = fit_stations(judged->poses.reconstruction.views, session);
-  return fit && contradicted(*fit, options);
+  return stations_contradict(judged->poses.reconstruction.views, session, options);
 }
 
 }  // namespace

@@ -229,6 +229,19 @@ bool contradicted(const StationFit& fit, const PoseOptions& options) {
            fit.outliers <= max_contradicting * fit.views);
 }
 
+bool stations_contradict(const std::vector<PosedView>& views, const Session& session,
+                         const PoseOptions& options) {
+  const auto fit = fit_stations(views, session);
+  return fit && contradicted(*fit, options);
+}
+
+std::optional<EvenSpacing> spacing_of(const std::vector<PosedView>& views, const Session& session) {
+  auto even = even_spacing(views, session);
+  const double most = max_contradicting * static_cast<double>(views.size());
+  if (even && static_cast<double>(even->astray.size()) > most) return std::nullopt;
+  return even;
+}
+
 bool passes_gates(ModalityPoses& poses, const Session& session, const PoseOptions& options,
                   std::string& why) {
   const auto posed = static_cast<int>(poses.reconstruction.views.size());

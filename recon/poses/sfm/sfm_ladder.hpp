@@ -52,6 +52,11 @@ inline constexpr double max_contradicting = 0.15;
 
 /// More views lie beside their stations, or farther from them, than is believed.
 bool contradicted(const StationFit& fit, const PoseOptions& options);
+/// Whether the stations that views have contradict them; false where too few have one.
+bool stations_contradict(const std::vector<PosedView>& views, const Session& session,
+                         const PoseOptions& options);
+/// The even spacing of all but so few of the views; nothing where no spacing explains the model.
+std::optional<EvenSpacing> spacing_of(const std::vector<PosedView>& views, const Session& session);
 
 /// The gates a model must pass without ground truth; `why` says the figures either way.
 /// Fills poses.gates.

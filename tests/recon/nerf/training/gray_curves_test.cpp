@@ -142,12 +142,23 @@ TEST(GrayCurves, HeldOutViewsFollowAndHaveNoSay) {
   heldout[3] = heldout[8] = true;
   const GrayCurves found = curves_of(data, heldout);
   Dataset spoilt = data;  // few levels: the steepest of all curves
-  spoilt.views[3].image = 120 + 0.05 * spoilt.views[3].image;
+  spoilt.views[3].image = cv::Mat(120 + 0.05 * data.views[3].image);
   const GrayCurves other = curves_of(spoilt, heldout);
   ASSERT_TRUE(found.told() && other.told());
   for (std::size_t i = 0; i < data.views.size(); ++i)
     EXPECT_TRUE(heldout[i] || found.of_view[i] == other.of_view[i]) << i;
   EXPECT_LT(disagreement(data, &found), 0.45 * disagreement(data, nullptr));
+}
+
+TEST(GrayCurves, AHeldOutBlackHotViewMakesNoOthersMove) {
+  const Dataset data = gray_scene([](std::size_t view, double v) { return view == 3 ? 1 - v : v; });
+  std::vector<bool> heldout(data.views.size(), false);
+  heldout[3] = true;
+  const GrayCurves found = curves_of(data, heldout);
+  EXPECT_FALSE(found.told());
+  EXPECT_EQ(found.reversed, std::vector<std::size_t>{3});
+  heldout[3] = false;
+  EXPECT_TRUE(curves_of(data, heldout).told());
 }
 
 TEST(GrayCurves, NothingSharedIsNotTold) {

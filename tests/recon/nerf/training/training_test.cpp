@@ -226,7 +226,9 @@ TEST(Training, GrayViewsOfACameraOnAutomaticAreBroughtToOneScale) {
   };
   EXPECT_GT(slope(2) / slope(1), 1.3);  // gains of 4.5 and 11.5
   options.even_exposure = false;
-  EXPECT_TRUE(train(gray, options, {}, field, &guide)->gray_curves.empty());
+  const auto stored = train(gray, options, {}, field, &guide);
+  ASSERT_TRUE(stored) << stored.error().message();
+  EXPECT_TRUE(stored->gray_curves.empty());
 }
 
 TEST(Training, StopsAtATargetAndKeepsTheBestStep) {

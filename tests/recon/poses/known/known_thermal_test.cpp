@@ -2,6 +2,7 @@
 // Known thermal poses on their way through the pose stage: believed, replaced or all in doubt.
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/image/image_io.hpp"

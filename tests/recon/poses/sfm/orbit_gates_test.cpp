@@ -140,11 +140,11 @@ TEST(OrbitGates, AnotherSpacingIsEvenAndAFoldIsNot) {
     // Upright and broad photos are counted each from 0, as those of two cameras.
     frame.sequence = i / 2;
   }
-  const auto even = [&](const auto& azimuth_of) {
+  const auto at = [&](const auto& azimuth_at) {
     ModalityPoses poses;
     for (std::size_t i = 0; i < session.frames.size(); ++i) {
       OrbitPose pose;
-      pose.azimuth_deg = azimuth_of(30.0 * static_cast<double>(i % 12));
+      pose.azimuth_deg = azimuth_at(i);
       pose.elevation_deg = i < 12 ? 10 : 32;
       pose.radius = 4;
       const Camera camera = testing_orbit::camera(1400);
@@ -153,12 +153,21 @@ TEST(OrbitGates, AnotherSpacingIsEvenAndAFoldIsNot) {
     }
     return even_spacing(poses.reconstruction.views, session).value();
   };
+  const auto even = [&](const auto& azimuth_of) {
+    return at([&](std::size_t i) { return azimuth_of(30.0 * static_cast<double>(i % 12)); });
+  };
   const auto astray = [&](const auto& azimuth_of) { return even(azimuth_of).astray; };
   EXPECT_TRUE(astray(as_taken).empty());
   EXPECT_NEAR(even(as_taken).spacing_deg, 30, 0.3);
   const EvenSpacing back = even([](double a) { return -as_taken(a); });
   EXPECT_TRUE(back.astray.empty()) << "walked the other way";
   EXPECT_NEAR(back.spacing_deg, -30, 0.3);
+  const auto aside = [](std::size_t i) {
+    return 30.0 * static_cast<double>(i) + (i < 12 ? 0 : 12);
+  };
+  EXPECT_NEAR(at(aside).spacing_deg, 30, 0.01) << "the second loop begins aside of the first";
+  const auto open = [](std::size_t i) { return 25.0 * static_cast<double>(i); };
+  EXPECT_NEAR(at(open).spacing_deg, 25, 0.11) << "no closed loop";
   const std::size_t many = static_cast<std::size_t>(max_contradicting * 24) + 1;
   EXPECT_GE(astray(front_on_back).size(), many);
   EXPECT_GE(astray(mirrored_back).size(), many);
