@@ -47,11 +47,12 @@ void print(terminal::Console& console, const json& result) {
                                100 * it->at("thermal_covered").get<double>()));
   }
   if (const auto it = result.find("test_views"); it != result.end() && it->contains("gray_mae_c"))
-    console.data(
-        fmt::format("{:<22} gray levels: rank correlation {:.3f} with the truth, off by "
-                    "{:.3f} degC where each stands for its usual temperature",
-                    "thermal field", it->at("gray_rank_correlation").get<double>(),
-                    it->at("gray_mae_c").get<double>()));
+    console.data(fmt::format(
+        "{:<22} gray levels: rank correlation {:.3f} with the truth, off by "
+        "{:.3f} degC where each stands for its usual temperature, {:.0f} % of the scene "
+        "covered",
+        "thermal field", it->at("gray_rank_correlation").get<double>(),
+        it->at("gray_mae_c").get<double>(), 100 * it->at("thermal_covered").get<double>()));
   for (const json& warning : result["warnings"]) console.warning(warning.get<std::string>());
   for (const json& note : result["notes"]) console.info("note: " + note.get<std::string>());
 }

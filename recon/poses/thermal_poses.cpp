@@ -93,7 +93,10 @@ std::optional<double> spacing_by_photos(const Session& session, const VisibleSce
              thermal = station_spacing_deg(session.frames_of(Modality::thermal, false));
   if (!photos || !thermal || !(std::abs(*photos - *thermal) < alike * *photos)) return std::nullopt;
   const auto even = spacing_of(visible.reconstruction.views, session);
-  return even ? std::optional(std::abs(even->spacing_deg)) : std::nullopt;
+  constexpr double least_deg = 1;  // a walk that goes round nothing has no loops
+  return even && std::abs(even->spacing_deg) >= least_deg
+             ? std::optional(std::abs(even->spacing_deg))
+             : std::nullopt;
 }
 
 /// From the images, by the stations of the thermal frames; where the photos contradict these by the

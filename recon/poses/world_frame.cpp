@@ -33,14 +33,13 @@ double robust_offset_deg(const std::vector<double>& differences) {
 /// was taken there or not.
 std::map<std::string, int> places_in_order(const Session& session) {
   std::map<Modality, int> per_loop;
-  for (const FrameRecord& frame : session.frames) {
-    if (frame.tracking || !frame.station) continue;
-    int& stations = per_loop[frame.modality];
-    const int index = frame.station->index;
-    stations = std::max(stations, index + 1);
-    const double spacing_deg = index > 0 ? frame.station->azimuth_deg / index : 0;
-    if (spacing_deg > 0)
-      stations = std::max(stations, static_cast<int>(std::lround(360 / spacing_deg)));
+  for (const Modality modality : {Modality::visible, Modality::thermal}) {
+    const auto frames = session.frames_of(modality, false);
+    int& stations = per_loop[modality];
+    for (const FrameRecord* frame : frames)
+      if (frame->station) stations = std::max(stations, frame->station->index + 1);
+    if (const auto spacing_deg = station_spacing_deg(frames); spacing_deg && *spacing_deg > 0)
+      stations = std::max(stations, static_cast<int>(std::lround(360 / *spacing_deg)));
   }
   std::map<std::string, int> places;
   for (const FrameRecord& frame : session.frames)

@@ -85,7 +85,7 @@ struct EvenSpacing {
   /// the views.
   std::vector<std::string> astray;
 };
-/// The spacing that leaves the fewest astray; nothing for fewer than three views with stations.
+/// The spacing that views are least off; nothing for fewer than three views with stations.
 std::optional<EvenSpacing> even_spacing(const std::vector<PosedView>& views,
                                         const Session& session);
 
