@@ -3,8 +3,11 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "core/image/image_io.hpp"
@@ -17,7 +20,7 @@ constexpr std::uint64_t spoilt_every = 24, constant_at = 3, blind_at = 17;
 
 bool changes_images(const Perturbation& by) {
   return by.spoilt || by.noise_k > 0 || by.blur_px > 0 || by.width_px > 0 || by.gray_gain ||
-         by.radial != 0;
+         by.radial != 0 || by.roll_deg != 0;
 }
 
 /// Each image stretched between its own 1 and 99 per cent, as a camera without radiometry does.
@@ -30,6 +33,33 @@ cv::Mat gray_of(const cv::Mat& kelvin) {
   kelvin.convertTo(gray, CV_8U, 255 / std::max(high - low, 1e-3),
                    -255 * low / std::max(high - low, 1e-3));
   return gray;
+}
+
+/// What a camera rolled clockwise by `deg` shows, without the corners that nobody recorded: its
+/// lens is that much longer.
+cv::Mat rolled(const cv::Mat& kelvin, double deg, double zoom, PosedView& truth) {
+  const double angle = deg * std::numbers::pi / 180;
+  const cv::Matx23d from_rolled(std::cos(angle) / zoom, -std::sin(angle) / zoom, 0,
+                                std::sin(angle) / zoom, std::cos(angle) / zoom, 0);
+  const Eigen::Vector2d middle(truth.camera.cx - 0.5, truth.camera.cy - 0.5);
+  cv::Matx23d map = from_rolled;
+  map(0, 2) = middle.x() - map(0, 0) * middle.x() - map(0, 1) * middle.y();
+  map(1, 2) = middle.y() - map(1, 0) * middle.x() - map(1, 1) * middle.y();
+  cv::Mat turned;
+  cv::warpAffine(kelvin, turned, map, kelvin.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                 cv::BORDER_CONSTANT, std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Quaterniond rolled_from_cam(Eigen::AngleAxisd(-angle, Eigen::Vector3d::UnitZ()));
+  truth.cam_from_world.rotation = rolled_from_cam * truth.cam_from_world.rotation;
+  truth.cam_from_world.translation = rolled_from_cam * truth.cam_from_world.translation;
+  truth.camera.fx *= zoom, truth.camera.fy *= zoom;
+  return turned;
+}
+
+/// By which an image that is rolled so far has to grow to be without empty corners.
+double zoom_of(double roll_deg, int width, int height) {
+  const double angle = std::abs(roll_deg) * std::numbers::pi / 180;
+  const double aspect = static_cast<double>(std::max(width, height)) / std::min(width, height);
+  return std::cos(angle) + aspect * std::sin(angle);
 }
 
 Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG& random,
@@ -46,6 +76,9 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
     truth.camera.k1 = by.radial;
     kelvin = undistorted(kelvin, straight, truth.camera);
   }
+  if (by.roll_deg != 0)
+    kelvin = rolled(kelvin, random.uniform(-by.roll_deg, by.roll_deg),
+                    zoom_of(by.roll_deg, frame.width, frame.height), truth);
   if (by.noise_k > 0) {
     cv::Mat noise(kelvin.size(), CV_32F);
     random.fill(noise, cv::RNG::NORMAL, 0, by.noise_k);
@@ -68,11 +101,12 @@ Status rewrite(Scene& scene, FrameRecord& frame, const Perturbation& by, cv::RNG
 
 /// Thermal frames that were not recorded.
 void leave_out(Session& session, const Perturbation& by) {
-  int seen = 0, missing = 0;
+  int seen = 0, missing = 0, place = 0;
   std::erase_if(session.frames, [&](const FrameRecord& frame) {
     if (frame.modality != Modality::thermal || !frame.station) return false;
     if (by.one_loop && frame.station->loop != 0) return true;
     if (frame.station->azimuth_deg >= by.sector_deg) return true;
+    if (place++ % by.keep_every != 0) return true;
     const bool chosen = ++seen % 7 == 5 && missing < by.missing_stations;
     missing += chosen ? 1 : 0;
     return chosen;
@@ -83,7 +117,7 @@ void leave_out(Session& session, const Perturbation& by) {
 
 const std::vector<Perturbation>& perturbations() {
   static const std::vector<Perturbation> all = [] {
-    std::vector<Perturbation> list(18);
+    std::vector<Perturbation> list(24);
     list[1].name = "focal+3", list[1].focal_error = 0.03;
     list[2].name = "focal-3", list[2].focal_error = -0.03;
     list[3].name = "stations5", list[3].station_error_deg = 5;
@@ -101,6 +135,13 @@ const std::vector<Perturbation>& perturbations() {
     list[15].name = "half", list[15].sector_deg = 180;
     list[16].name = "loop", list[16].one_loop = true;
     list[17].name = "spoilt", list[17].spoilt = true;
+    list[18].name = "nolens", list[18].focal_unknown = true;
+    list[19].name = "folder", list[19].focal_unknown = list[19].order_alone = true;
+    list[20].name = "third", list[20].keep_every = 3;
+    list[21].name = "roll12", list[21].roll_deg = 12;
+    list[22].name = "160px", list[22].width_px = 160, list[22].noise_k = 0.07;
+    list[23].name = "handheld", list[23].focal_unknown = list[23].order_alone = true;
+    list[23].width_px = 160, list[23].noise_k = 0.07, list[23].roll_deg = 8;
     return list;
   }();
   return all;
@@ -110,10 +151,16 @@ Status perturb(Scene& scene, const Perturbation& by, const std::filesystem::path
   leave_out(scene.session, by);
   for (DeviceInfo& device : scene.session.devices) {
     if (device.modality != Modality::thermal || !device.lens.focal_px) continue;
+    if (by.focal_unknown) {
+      device.lens.focal_px.reset();
+      continue;
+    }
     *device.lens.focal_px *= 1 + by.focal_error;
     const FrameRecord* frame = scene.session.frames_of(Modality::thermal).front();
     if (by.width_px > 0 && by.width_px < frame->width)
       *device.lens.focal_px *= static_cast<double>(by.width_px) / frame->width;
+    if (by.roll_deg != 0)
+      *device.lens.focal_px *= zoom_of(by.roll_deg, frame->width, frame->height);
   }
   cv::RNG random(11);
   int station = 0;

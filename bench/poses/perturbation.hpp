@@ -14,11 +14,14 @@ namespace orbitfuse::scenes {
 struct Perturbation {
   std::string name = "default";
   double focal_error = 0;        ///< of the thermal prior, relative
+  bool focal_unknown = false;    ///< nothing is told of the thermal lens
   double station_error_deg = 0;  ///< added to azimuths with alternating sign
   double start_deg = 0;          ///< added to every azimuth
   bool backwards = false;        ///< the thermal orbit walked and declared the other way
   int missing_stations = 0;      ///< recorded frames that are not there
+  int keep_every = 1;            ///< recorded frames; 3: eight of 24
   double noise_k = 0;            ///< standard deviation added
+  double roll_deg = 0;           ///< the camera rolled by up to so much, another way each frame
   double blur_px = 0;            ///< at full width
   double radial = 0;             ///< k1 that the lens has and the session doesn't know
   int width_px = 0;              ///< reduced to; 0: as it is

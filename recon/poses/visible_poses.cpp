@@ -77,8 +77,10 @@ Result<ModalityPoses> pose_by_photos(const Session& session, const PoseOptions& 
     return poses;
   }
   for (const std::string& name : spacing->astray)
-    anew->doubtful.push_back({name, DoubtReason::off_its_loop,
-                              "it stands aside of where the even spacing of the others has it"});
+    if (std::none_of(anew->doubtful.begin(), anew->doubtful.end(),
+                     [&](const DoubtfulView& known) { return known.name == name; }))
+      anew->doubtful.push_back({name, DoubtReason::off_its_loop,
+                                "it stands aside of where the even spacing of the others has it"});
   anew->warnings.push_back(fmt::format(
       "the photos contradict the stations they were declared with: they are posed in their order "
       "alone, {0:.4g} degrees apart; import with --station-spacing-deg {0:.4g}, or without "

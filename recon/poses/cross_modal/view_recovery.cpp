@@ -4,7 +4,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "core/image/undistorted.hpp"
 #include "core/numeric/median.hpp"
@@ -22,6 +24,8 @@ namespace {
 constexpr double nudged_below_share = 0.85, nudge_deg = 2;
 /// Views with less than this share are searched as wholes.
 constexpr double lost_share = 0.6;
+/// Through a lens that is off by this share nobody judges views.
+constexpr double other_lens_share = 0.05;
 
 /// From a degree or two off, the first without new renders of the field.
 std::vector<RenderRound> approach_rounds() {
@@ -181,6 +185,30 @@ Status judge_bundled(const OrbitRefinement& refinement, const std::vector<std::s
   return {};
 }
 
+/// What temperatures said of the views through a lens that has turned out to be another, or could
+/// not say because they contradicted most, they are asked again; what they move is bundled again.
+/// The images are straight by now.
+Status judge_anew(const OrbitRefinement& refinement, const FocalGuess& prior, Fit& alignment) {
+  const TraceSpan span("judge anew");
+  refinement.progress.report({"poses.thermal", 3, 4, -1, "views judged anew, by the lens found"});
+  for (RenderAlignedView& view : alignment.views) view.verdict = {};
+  const double found_focal_px = alignment.views.front().view.camera.fx;
+  const double radial = std::exchange(alignment.radial, 0),
+               radial_px = std::exchange(alignment.radial_px, 0);
+  ORBITFUSE_ASSIGN(const TemperatureCheck check, correct_by_temperatures(refinement, alignment));
+  if (check.moved > 0) {
+    const Fit before = alignment;
+    ORBITFUSE_TRY(
+        bundle_thermal(refinement, {prior.focal_px, prior.relative_sigma, 0}, {}, alignment));
+    ORBITFUSE_TRY(judge_bundled(refinement, not_dropped(alignment), before, alignment));
+    ORBITFUSE_TRY(keep_by_temperatures(refinement, check, alignment));
+  }
+  const double scale = alignment.views.front().view.camera.fx / found_focal_px;
+  alignment.radial = radial * scale * scale;
+  alignment.radial_px = radial_px;
+  return {};
+}
+
 }  // namespace
 
 Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlignment& alignment,
@@ -212,6 +240,10 @@ Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlig
   std::vector<std::size_t> all(alignment.views.size());
   std::iota(all.begin(), all.end(), std::size_t{0});
   ORBITFUSE_TRY(judge_bundled(refinement, all, before, alignment));
+  const double focal_moved = std::abs(
+      std::log(alignment.views.front().view.camera.fx / before.views.front().view.camera.fx));
+  if (check.undecided > 0 || focal_moved > other_lens_share)
+    ORBITFUSE_TRY(judge_anew(refinement, prior, alignment));
   ORBITFUSE_TRY(try_places_beside(refinement, alignment));
   return {};
 }

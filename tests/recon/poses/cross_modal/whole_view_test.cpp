@@ -3,12 +3,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/patch_matching.hpp"
 #include "recon/poses/cross_modal/view_recovery.hpp"
 #include "recon/poses/world_frame.hpp"
 #include "tests/support/box_scene.hpp"
 #include "tests/support/orbit_fixture.hpp"
+#include "tests/support/thermal_ball.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -137,6 +140,28 @@ TEST(RefineOrbit, ConstantImagesChangeNothingAndStayFinite) {
     EXPECT_TRUE(view.view.cam_from_world.is_finite());
     EXPECT_EQ(view.support(), 0);
   }
+}
+
+TEST(RefineOrbit, WhatWasJudgedThroughAnotherLensIsJudgedAnew) {
+  // Edges that two modalities share lie beside each other: the lens that they tell is another, and
+  // seen through it every view contradicts the others. Patches of the thermal views tell the lens.
+  testing_orbit::Ball ball;
+  const SceneRenderer beside = [](const Camera& camera, const Rigid3d& pose) {
+    SceneRender seen = testing_orbit::ball_view(camera, pose, false);
+    Camera longer = camera;
+    longer.fx *= 1.2, longer.fy *= 1.2;
+    seen.brightness = testing_orbit::ball_view(longer, pose, false).brightness;
+    return Result<SceneRender>(seen);
+  };
+  std::vector<std::string> told;
+  ball.progress.report = [&](const ProgressEvent& event) { told.push_back(event.detail); };
+  ASSERT_TRUE(refine_orbit(beside, ball.orbit, ball.alignment, {0.3, 0}, ball.progress));
+  ASSERT_EQ(
+      std::count(told.begin(), told.end(), "12 views contradicted by the others' temperatures"), 1)
+      << "the case that this is about";
+  EXPECT_NEAR(ball.focal_error(), 0, 0.03);
+  for (const RenderAlignedView& view : ball.alignment.views)
+    EXPECT_TRUE(view.verdict.sure()) << view.view.name << ": " << view.verdict.detail;
 }
 
 }  // namespace
