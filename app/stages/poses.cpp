@@ -136,7 +136,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   stage.name = "poses_" + std::string(name(modality));
   stage.version = 21;  // views aside of another even spacing than the declared one
   if (!visible) {
-    stage.version = 28;  // judged anew by another lens
+    stage.version = 29;  // judged anew by another lens; starts beside
     stage.uses = {"poses_visible"};
     if (asks_for_renders(in.session->session, in.config->poses))
       stage.uses.push_back("train_visible");

@@ -249,7 +249,12 @@ Result<SelectedOrbit> select_by_renders(const SceneRenderer& renderer, OrbitView
       selected.lead_standard_errors =
           std::min(selected.lead_standard_errors.value_or(std::numeric_limits<double>::infinity()),
                    lead_standard_errors(selected.alignment, alignment));
+  double rival = 0;
+  for (std::size_t h = 0; h < hypotheses.size(); ++h)
+    if (is_rival(hypotheses[h], hypotheses[selected.hypothesis]))
+      rival = std::max(rival, mean_support(openings[h]));
   selected.opening = std::move(openings[selected.hypothesis]);
+  selected.opening_lead = mean_support(selected.opening) / rival;
   orbit.clockwise = hypotheses[selected.hypothesis].mirrored;
   orbit.stations = hypotheses[selected.hypothesis].stations;
   return selected;

@@ -25,6 +25,8 @@ struct SelectedOrbit {
   std::size_t hypothesis = 0;               ///< index of the chosen one
   std::vector<HypothesisSupport> supports;  ///< of each, in the search's order
   RenderAlignment opening;                  ///< of the chosen one: open_orbit()
+  /// Its mean support by that of the best opening that starts elsewhere; infinite without one.
+  double opening_lead = 0;
   /// How far the best one leads the next that starts elsewhere or turns the other way, taken to the
   /// same end: mean difference of the views' supports in its own standard errors. None: no rival.
   std::optional<double> lead_standard_errors;

@@ -15,6 +15,12 @@
 namespace orbitfuse {
 namespace {
 
+/// Where temperatures contradicted this share, patches have to confirm the median view, or nobody
+/// knows any. Rows of the perturbed suite that are right had up to 0.5 of the views contradicted
+/// and 33 patches or more; `statue` with rolled cameras, 11 % off, 0.4 and 19.
+constexpr double much_contradicted = 0.3;
+constexpr double least_confirming_patches = 30;
+
 /// Of the views' median correlation with what the others paint at their places; a view with less is
 /// searched again. A wrong view of `sedan` had .56 of .96, right ones .84 and more unless a wrong
 /// neighbour painted.
@@ -233,6 +239,7 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
       {"poses.thermal", 3, 4, -1,
        fmt::format("{} views contradicted by the others' temperatures", lost.size())});
   TemperatureCheck check;
+  check.contradicted = static_cast<int>(lost.size());
   if (2 * lost.size() > alignment.views.size()) check.undecided = static_cast<int>(lost.size());
   if (check.undecided > 0)
     for (const std::size_t i : lost)
@@ -295,6 +302,25 @@ Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refineme
     view.view = place;
   }
   return check;
+}
+
+void doubt_unconfirmed(int contradicted, Fit& alignment) {
+  const std::vector<std::size_t> kept = not_dropped(alignment);
+  if (kept.empty() ||
+      contradicted < much_contradicted * static_cast<double>(alignment.views.size()))
+    return;
+  std::vector<double> patches;
+  for (const std::size_t i : kept)
+    patches.push_back(alignment.views[i].confirmed_patches.value_or(0));
+  const double typical = median(patches);
+  if (typical >= least_confirming_patches) return;
+  for (const std::size_t i : kept)
+    if (ViewVerdict& verdict = alignment.views[i].verdict; verdict.sure())
+      verdict = {
+          Confidence::doubtful, DoubtReason::undecided,
+          fmt::format("the others' temperatures contradicted {} of {} views, and few patches "
+                      "are found again in several ({:.0f} in the median view)",
+                      contradicted, alignment.views.size(), typical)};
 }
 
 Status confirm_by_temperatures(const OrbitRefinement& refinement, std::size_t first_new,

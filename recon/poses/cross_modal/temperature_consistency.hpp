@@ -27,6 +27,7 @@ Result<Fit> best_by_temperatures(const OrbitRefinement& painted,
                                  const std::vector<std::size_t>& lost, const Fit& alignment);
 
 struct TemperatureCheck {
+  int contradicted = 0;
   int moved = 0;
   int undecided = 0;  ///< contradicted, where that were most of the views
   /// Views that form would pull away from where temperatures have them.
@@ -40,6 +41,10 @@ struct TemperatureCheck {
 /// probation where it is nearly so: judge_views() settles that once the bundle has moved it. Where
 /// most are contradicted nobody is left to judge: they stay, as doubtful.
 Result<TemperatureCheck> correct_by_temperatures(const OrbitRefinement& refinement, Fit& alignment);
+
+/// Where temperatures contradicted many views and few patches are found again in several, all are
+/// in doubt: such views confirm each other at wrong places too.
+void doubt_unconfirmed(int contradicted, Fit& alignment);
 
 /// Every added view, from `first_new` on, confirmed by what the settled ones before it measured;
 /// those that are not are searched as wholes in it, and dropped if that fails.

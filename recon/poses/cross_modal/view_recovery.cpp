@@ -187,8 +187,8 @@ Status judge_bundled(const OrbitRefinement& refinement, const std::vector<std::s
 
 /// What temperatures said of the views through a lens that has turned out to be another, or could
 /// not say because they contradicted most, they are asked again; what they move is bundled again.
-/// The images are straight by now.
-Status judge_anew(const OrbitRefinement& refinement, const FocalGuess& prior, Fit& alignment) {
+/// The images are straight by now. Returns how many they contradict.
+Result<int> judge_anew(const OrbitRefinement& refinement, const FocalGuess& prior, Fit& alignment) {
   const TraceSpan span("judge anew");
   refinement.progress.report({"poses.thermal", 3, 4, -1, "views judged anew, by the lens found"});
   for (RenderAlignedView& view : alignment.views) view.verdict = {};
@@ -206,7 +206,7 @@ Status judge_anew(const OrbitRefinement& refinement, const FocalGuess& prior, Fi
   const double scale = alignment.views.front().view.camera.fx / found_focal_px;
   alignment.radial = radial * scale * scale;
   alignment.radial_px = radial_px;
-  return {};
+  return check.contradicted;
 }
 
 }  // namespace
@@ -242,9 +242,12 @@ Status refine_orbit(const SceneRenderer& renderer, OrbitViews& orbit, RenderAlig
   ORBITFUSE_TRY(judge_bundled(refinement, all, before, alignment));
   const double focal_moved = std::abs(
       std::log(alignment.views.front().view.camera.fx / before.views.front().view.camera.fx));
-  if (check.undecided > 0 || focal_moved > other_lens_share)
-    ORBITFUSE_TRY(judge_anew(refinement, prior, alignment));
+  int contradicted = check.contradicted;
+  if (check.undecided > 0 || focal_moved > other_lens_share) {
+    ORBITFUSE_ASSIGN(contradicted, judge_anew(refinement, prior, alignment));
+  }
   ORBITFUSE_TRY(try_places_beside(refinement, alignment));
+  doubt_unconfirmed(contradicted, alignment);
   return {};
 }
 

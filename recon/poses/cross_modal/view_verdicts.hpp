@@ -32,6 +32,8 @@ struct ViewEvidence {
   /// The median of its loop's other stations' support_share; 0 where they are fewer than three, or
   /// there is no other loop to compare them with.
   double loop_support_share = 0;
+  /// The median view has enough patches: few of them speak against a view.
+  bool patches_tell = false;
 };
 
 /// One entry a view; stations are the first so many. Errors: the renderer's, cancelled.

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <cmath>
 #include <limits>
 
@@ -264,6 +266,26 @@ TEST(CorrectByTemperatures, WhereMostAreContradictedNoneGoes) {
   EXPECT_EQ(doubted, check->undecided) << "kept, but not in silence";
   for (std::size_t i = 0; i < 12; ++i)
     EXPECT_EQ(off_deg(alignment.views[i], before.views[i].view), 0) << i;
+}
+
+TEST(CorrectByTemperatures, WhatWasContradictedAndPatchesDontConfirmIsInDoubt) {
+  const auto doubted = [](int contradicted, int patches) {
+    OrbitViews orbit;
+    RenderAlignment alignment;
+    add_stations(orbit, alignment);
+    for (RenderAlignedView& view : alignment.views) view.confirmed_patches = patches;
+    alignment.views[3].verdict = {Confidence::dropped, DoubtReason::not_found, "nowhere"};
+    doubt_unconfirmed(contradicted, alignment);
+    EXPECT_EQ(alignment.views[3].verdict.confidence, Confidence::dropped);
+    return std::count_if(alignment.views.begin(), alignment.views.end(), [](const auto& view) {
+      return view.verdict.reason == DoubtReason::undecided;
+    });
+  };
+  EXPECT_EQ(doubted(5, 19), 11) << "statue with rolled cameras: 10 of 24, 19 patches, 11 % off";
+  EXPECT_EQ(doubted(5, 33), 0);
+  EXPECT_EQ(doubted(3, 19), 0);
+  Fit none;
+  doubt_unconfirmed(0, none);
 }
 
 TEST(AddViews, OnlyFramesThatBothScenesPlaceAlikeAreConfirmed) {

@@ -46,6 +46,16 @@ TEST(ViewVerdicts, WhatSpeaksAgainstAViewIsNamed) {
   EXPECT_TRUE(judged(weak, {}).sure()) << "one of both is no reason";
   weak.support_share = 0.5, weak.correlation = 0.9;
   EXPECT_TRUE(judged(weak, {}).sure());
+  // As measured on a view 9 % off; of scenes where the median view has few patches nobody is asked.
+  ViewEvidence unconfirmed = good;
+  unconfirmed.support_share = 0.56, unconfirmed.confirmed_share = 0.04;
+  EXPECT_TRUE(judged(unconfirmed, {}).sure());
+  unconfirmed.patches_tell = true;
+  EXPECT_EQ(judged(unconfirmed, {}).reason, DoubtReason::weak_support);
+  unconfirmed.confirmed_share = 0.24;
+  EXPECT_TRUE(judged(unconfirmed, {}).sure());
+  unconfirmed.support_share = 0.8, unconfirmed.confirmed_share = 0;
+  EXPECT_TRUE(judged(unconfirmed, {}).sure()) << "form knows it well";
   // A painted scene's doubt is overruled by what neighbours measured, not by anything else.
   const ViewVerdict painted{Confidence::doubtful, DoubtReason::temperatures_elsewhere, "1 deg"};
   ViewEvidence confirmed = good;
