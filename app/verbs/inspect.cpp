@@ -256,6 +256,14 @@ Status inspect_session(Context& context, const fs::path& folder) {
     context.result["damaged"].push_back(error.message());
     context.console.warning("damaged: " + error.message());
   }
+  context.result["missing"] = session.missing_files;
+  if (damaged.empty() && !session.missing_files.empty())
+    return fail(ErrorKind::input, folder.string(),
+                fmt::format("{} of {} frames are missing, first {}", session.missing_files.size(),
+                            session.frames.size() + session.missing_files.size(),
+                            session.missing_files.front()),
+                "copy them from the original, or import the session again; a run goes on without "
+                "them");
   if (damaged.empty()) return {};
   return fail(ErrorKind::input, folder.string(),
               fmt::format("{} of {} frames are damaged, first {}", damaged.size(),

@@ -58,7 +58,7 @@ Status apply(const Json& line, const std::string& where, Session& session, Frame
 Status drop_missing_files(Session& session) {
   // A file that can't be asked may be there: a session without it would be a guess.
   std::optional<Error> unknown;
-  std::vector<std::string> missing_files;
+  std::vector<std::string>& missing_files = session.missing_files;
   std::erase_if(session.frames, [&](const FrameRecord& frame) {
     std::error_code error;
     const std::filesystem::path file = session.path_of(frame);

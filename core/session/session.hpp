@@ -117,8 +117,9 @@ struct Session {
   std::vector<GapRecord> gaps;
   std::vector<StreamRecord> streams;
   std::vector<EventRecord> events;
-  bool complete = false;              ///< the recorder closed it properly
-  std::vector<std::string> warnings;  ///< e.g. a cut last manifest line, a missing file
+  bool complete = false;                   ///< the recorder closed it properly
+  std::vector<std::string> missing_files;  ///< listed in the manifest; no frames of this session
+  std::vector<std::string> warnings;       ///< e.g. a cut last manifest line, a missing file
 
   std::filesystem::path path_of(const FrameRecord& frame) const { return folder / frame.file; }
   const DeviceInfo* device(const std::string& id) const;

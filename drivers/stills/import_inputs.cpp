@@ -43,8 +43,13 @@ class Gathering {
     inputs_.thermal = observed(thermal);
     inputs_.thermal_tracking = observed(thermal_tracking);
     ORBITFUSE_TRY(check_object_parameters());
-    inputs_.visible = photo_sources(visible);
-    inputs_.visible_tracking = photo_sources(visible_tracking);
+    inputs_.visible = photos_alone(photo_sources(visible));
+    inputs_.visible_tracking = photos_alone(photo_sources(visible_tracking));
+    if (!visible.empty() && inputs_.visible.empty())
+      return fail(ErrorKind::input, visible.front().string(),
+                  "a thermal image, and so are all of the photos",
+                  "give it with --thermal (--embedded-visible takes the photos inside), and photos "
+                  "with --visible");
     ORBITFUSE_TRY(check_roles());
     take_out_copies(Modality::visible, {&inputs_.visible, &inputs_.visible_tracking});
     take_out_copies(Modality::thermal, {&inputs_.thermal, &inputs_.thermal_tracking});
@@ -205,6 +210,18 @@ class Gathering {
         sources.push_back(source);
       }
     }
+    return sources;
+  }
+
+  /// A thermal camera's folder holds both: what its radiometric JPEGs show are temperatures.
+  std::vector<Source> photos_alone(std::vector<Source> sources) {
+    std::erase_if(sources, [&](const Source& source) {
+      if (!source.radiometric) return false;
+      remarks_.left_out(source.file.string(),
+                        "a thermal image, not a photo (give it with --thermal; --embedded-visible "
+                        "takes the photo inside)");
+      return true;
+    });
     return sources;
   }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "core/system/file_io.hpp"
+#include "drivers/stills/flir_jpeg.hpp"
 #include "drivers/stills/still_photo.hpp"
 #include "drivers/stills/video_frames.hpp"
 
@@ -36,6 +37,7 @@ std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& file
     if (bytes) {
       source.hash = content_hash(*bytes);
       source.taken_ns = exif_of_photo(*bytes).taken_ns;
+      source.radiometric = is_flir_jpeg(*bytes);
     }
     sources.push_back(std::move(source));
   }

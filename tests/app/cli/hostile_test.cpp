@@ -359,6 +359,15 @@ TEST_F(Hostile, InspectLooksAtTheFrames) {
                                  HasSubstr("2 of 24")));
 }
 
+TEST_F(Hostile, InspectMissesFramesThatAreGone) {
+  write_fixture_session(path("s"));
+  fs::remove(path("s/thermal/000001.tiff"));
+  const Outcome outcome = orbitfuse_program({"inspect", path("s"), "--json"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.result().at("missing"), nlohmann::json({"thermal/000001.tiff"}));
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("1 of 24 frames are missing"), HasSubstr("copy them")));
+}
+
 TEST_F(Hostile, ExchangedFramesAreToldAndEditedOnesNamed) {
   write_fixture_session(path("s"));
   fs::rename(path("s/visible/000003.png"), path("kept"));

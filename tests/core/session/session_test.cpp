@@ -305,6 +305,7 @@ TEST_F(SessionTest, ManyMissingImagesAreOneWarning) {
   ASSERT_EQ(s->warnings.size(), 1u);
   EXPECT_NE(s->warnings[0].find("300 files are listed"), std::string::npos);
   EXPECT_NE(s->warnings[0].find("and 297 more"), std::string::npos) << s->warnings[0];
+  EXPECT_EQ(s->missing_files.size(), 300u);
 }
 
 TEST_F(SessionTest, UnknownLinesAreSkippedAndNewerFormatsRefused) {

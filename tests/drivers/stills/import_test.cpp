@@ -19,6 +19,7 @@
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/drivers/stills/import_files.hpp"
+#include "tests/support/made_files.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -182,6 +183,24 @@ TEST_F(ImportTest, EveryCameraModelAtHandDecodesToPlausibleTemperatures) {
     EXPECT_GT(low, 200) << frame->source;
     EXPECT_LT(high, 500) << frame->source;
   }
+}
+
+TEST_F(ImportTest, ThermalImagesAmongPhotosAreLeftOutByName) {
+  put_photo("in/dc_1.jpg");
+  put("in/ir_1.jpg",
+      made::flir_jpeg(cv::Mat(24, 32, CV_16U, cv::Scalar(14000)), made::flir_calibration()));
+  options.visible = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 1);
+  EXPECT_THAT(report->warnings,
+              ::testing::Contains(::testing::AllOf(HasSubstr("ir_1.jpg"), HasSubstr("--thermal"))));
+  // Nothing else there: no session without the photos that were asked for.
+  fs::remove(folder / "in/dc_1.jpg");
+  fs::remove_all(folder / "session");
+  const auto none = import();
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().message(), HasSubstr("ir_1.jpg"));
 }
 
 TEST_F(ImportTest, RadiometricJpegCutAnywhereIsAnErrorOrAWholeImage) {
