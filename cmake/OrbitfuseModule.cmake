@@ -8,8 +8,9 @@ include(GNUInstallDirs)
 set(orbitfuse_compile_options
   -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wold-style-cast
   $<$<BOOL:${ORBITFUSE_WERROR}>:-Werror>
-  # g++ 12 reports these in inlined <string>, fmt and Eigen code that is correct (GCC bug 105329).
-  -Wno-stringop-overflow -Wno-restrict -Wno-array-bounds
+  # g++ 12 reports these in inlined <string>, fmt and Eigen code that is correct (GCC bug 105329), one
+  # of them by the length of the path that this folder was cloned to.
+  -Wno-stringop-overflow -Wno-stringop-overread -Wno-restrict -Wno-array-bounds
   # AVX2 is the baseline; kernels that want more are dispatched at run time (orbitfuse_isa_sources).
   -march=x86-64-v3
   # a*b+c must round alike in every translation unit, or results depend on inlining.

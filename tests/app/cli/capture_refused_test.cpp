@@ -76,7 +76,7 @@ TEST_F(RefusedGigE, WatchedDevicesAreToldWhenTheyArrive) {
 TEST_F(RefusedGigE, CameraThatAnotherProgramControls) {
   aravis::AravisOptions options;
   options.camera = "127.0.0.1";
-  options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+  options.profiles = std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "config/cameras";
   aravis::AravisSource first(options);
   ASSERT_TRUE(first.start());
   const Outcome outcome =

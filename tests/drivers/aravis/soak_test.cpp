@@ -28,7 +28,7 @@ class AravisSoak : public ::testing::Test {
     camera.set_faults(faults);
     AravisOptions options;
     options.camera = "127.0.0.1";
-    options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+    options.profiles = std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "config/cameras";
     auto source = std::make_unique<AravisSource>(options);
     return source->start() ? std::move(source) : nullptr;
   }

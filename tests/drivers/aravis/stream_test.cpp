@@ -22,7 +22,7 @@ class AravisStream : public ::testing::Test {
   void SetUp() override {
     if (!camera.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 on loopback is in use";
     options.camera = "127.0.0.1";
-    options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+    options.profiles = std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "config/cameras";
     options.buffers = 240;  // 4 s: a busy host that runs other tests loses no frame of its own
   }
   static GevOptions small() {
@@ -485,7 +485,7 @@ class AravisUnguarded : public AravisStream {
   void SetUp() override {
     if (!camera_of_all.start_when_free()) GTEST_SKIP() << "the GVCP port 3956 is in use";
     options.camera = "127.0.0.1";
-    options.profiles = std::string(ORBITFUSE_SOURCE_DIR) + "/config/cameras";
+    options.profiles = std::filesystem::path(ORBITFUSE_SOURCE_DIR) / "config/cameras";
   }
   /// Streams, lets the camera be away with `fault`, and sees it come back.
   void expect_one_reconnection(const GevFaults& fault, std::chrono::milliseconds away) {
