@@ -71,6 +71,17 @@ inline Delivery event_delivery(EventKind kind, std::string detail) {
   return delivery;
 }
 
+/// What earlier recordings of a session knew of a device.
+struct Earlier {
+  DeviceInfo device;
+  std::vector<FrameRecord> frames;
+  std::vector<GapRecord> gaps;
+  std::uint64_t next_id = 0;  ///< after all that they account for, received or lost
+};
+
+/// The word before why a frame that came damaged is lost, in GapRecord::reason.
+inline constexpr const char* rejected_because = "rejected: ";
+
 /// One camera. start, next and stop are called from one thread, describe from any thread after
 /// the constructor; stop is idempotent and is called even when start failed.
 class FrameSource {
@@ -84,14 +95,10 @@ class FrameSource {
   /// but a `rejected` delivery. Ids rise strictly.
   virtual Result<Delivery> next(std::chrono::milliseconds timeout) = 0;
   virtual void stop() = 0;
-  /// Goes on with a session: what earlier recordings knew of the device, its frames, and the id
-  /// after all that they account for, received or lost. Called before the first next(); a source of
-  /// files leaves out those that it delivered then. True when its ids go on from `next_id` by
-  /// themselves; else the recording shifts them there.
-  virtual bool resume(const DeviceInfo& /*device*/, const std::vector<FrameRecord>& /*frames*/,
-                      std::uint64_t /*next_id*/) {
-    return false;
-  }
+  /// Goes on with a session. Called before the first next(); a source of files leaves out those
+  /// that it delivered then. True when its ids go on from Earlier::next_id by themselves; else the
+  /// recording shifts them there.
+  virtual bool resume(const Earlier& /*earlier*/) { return false; }
   /// The session holds frames of this scale (K a count): a source that chooses the scale of its
   /// thermal frames takes none finer. Before the first next(), beside resume().
   virtual void store_no_finer_than(double /*kelvin_per_count*/) {}

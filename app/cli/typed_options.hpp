@@ -34,7 +34,8 @@ inline constexpr OptionRange emissivity_range = from_to(0.01, 1);
 inline constexpr OptionRange reflected_c_range = from_to(-272, 4700);
 inline constexpr OptionRange distance_m_range = from_to(0, 1e5);
 inline constexpr OptionRange air_c_range = from_to(-120, 120);
-inline constexpr OptionRange humidity_percent_range = from_to(0, 100);
+/// No open air is as dry as 1 %: 0.5 is a half.
+inline constexpr OptionRange humidity_percent_range = from_to(1, 100);
 
 /// A key of the library, and the option that sets it.
 struct TypedKey {

@@ -28,10 +28,7 @@ class PreparedSource final : public FrameSource {
   Status request_correction() override { return source_->request_correction(); }
   std::string transport_report() const override { return source_->transport_report(); }
   std::vector<Delivery> unfinished() override;
-  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,
-              std::uint64_t next_id) override {
-    return source_->resume(device, frames, next_id);
-  }
+  bool resume(const Earlier& earlier) override { return source_->resume(earlier); }
   void store_no_finer_than(double kelvin_per_count) override {
     source_->store_no_finer_than(kelvin_per_count);
   }

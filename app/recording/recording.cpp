@@ -40,11 +40,13 @@ bool same_camera(const DeviceInfo& known, const DeviceInfo& now) {
          (not_known_yet || (known.model == now.model && known.serial == now.serial));
 }
 
-std::vector<FrameRecord> frames_of(const Session& session, const std::string& device) {
-  std::vector<FrameRecord> frames;
-  std::copy_if(session.frames.begin(), session.frames.end(), std::back_inserter(frames),
-               [&](const FrameRecord& frame) { return frame.device == device; });
-  return frames;
+Earlier earlier_of(const Session& session, const DeviceInfo& device) {
+  Earlier earlier{device, {}, {}, next_id(session, device.id)};
+  const auto is_its = [&](const auto& record) { return record.device == device.id; };
+  std::copy_if(session.frames.begin(), session.frames.end(), std::back_inserter(earlier.frames),
+               is_its);
+  std::copy_if(session.gaps.begin(), session.gaps.end(), std::back_inserter(earlier.gaps), is_its);
+  return earlier;
 }
 
 /// Of the newest frame of the device with temperatures that can be read.
@@ -102,9 +104,9 @@ Status Recording::fit_into(const std::optional<Session>& earlier) {
       const DeviceInfo* known = earlier ? earlier->device(device.id) : nullptr;
       if (used.count(device.id) || (known && !same_camera(*known, device))) continue;
       if (known) {
-        const std::uint64_t next = next_id(*earlier, device.id);
-        const bool ids_go_on = source->resume(*known, frames_of(*earlier, device.id), next);
-        first_id = ids_go_on ? 0 : next;
+        const Earlier before = earlier_of(*earlier, *known);
+        const std::uint64_t next = before.next_id;
+        first_id = source->resume(before) ? 0 : next;
         if (next > 0) next_ids_[device.id] = next;
         if (const auto scale = stored_kelvin_per_count(*earlier, device.id)) {
           stored_kelvin_per_count_[device.id] = *scale;
@@ -253,8 +255,8 @@ Result<Ending> Recording::run(const std::atomic<bool>* cancel, const std::functi
   if (guide_) guide_->finish();
   if (!status && status.error().kind != ErrorKind::cancelled) return tl::unexpected(status.error());
   if (guide_ && guide_->error()) return tl::unexpected(*guide_->error());
-  // Ctrl-C is how a live recording ends, but it cuts a replay short.
-  if (cancel && *cancel && !options_.live)
+  // Ctrl-C, or Stop on the page, is how a live recording ends, but it cuts a replay short.
+  if (ending == Ending::stopped && !options_.live)
     return fail(ErrorKind::cancelled, "capture", "stopped by the user",
                 "every frame up to here is safe; the same command with --resume goes on");
   ORBITFUSE_TRY(writer_->close());

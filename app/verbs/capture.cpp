@@ -125,7 +125,8 @@ void account(Context& context, recording::Recording& recording) {
     context.console.data(s.any() ? fmt::format("{}: {} of ids {} to {}{}", s.device,
                                                account_words(s), s.first_id, s.last_id, absence(s))
                                  : s.device + ": no frame came" + absence(s));
-    if (s.passed_over > 0) context.console.data(passed_over(s));
+    for (const std::string& words : {passed_over(s), damaged(s)})
+      if (!words.empty()) context.console.data(words);
     streams.push_back(account_json(s));
   }
   context.result["session"] = recording.folder().string();

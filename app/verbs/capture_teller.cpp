@@ -23,13 +23,18 @@ std::string passed_over(const StreamStatus& s) {
                      s.passed_over == 1 ? "file" : "files", fmt::join(s.passed_over_last, "; "));
 }
 
+std::string damaged(const StreamStatus& s) {
+  return s.rejected == 0 ? "" : s.device + ": " + damaged_words(s);
+}
+
 void Teller::tick() {
   listen();
   if (view_) draw();
   for (const StreamStatus& s : recording_.status()) {
     tell_alarms(s);
     tell_correction(s);
-    tell_passed_over(s);
+    tell_seldom(s.device + " passed over", passed_over(s));
+    tell_seldom(s.device + " rejected", damaged(s));
   }
   if (recording_.guide()) tell_guide();
 }
@@ -45,7 +50,6 @@ void Teller::tell_alarms(const StreamStatus& s) {
   say(" dropped", s.dropped > 0, "the disk is too slow, frames are dropped and counted");
   say(" unwritten", s.unwritten > 0, "frames could not be written; is the disk full?");
   say(" missing", s.missing > 0, "frames are lost on the way and counted");
-  say(" rejected", s.rejected > 0, "frames arrive damaged and are counted");
 }
 
 /// Also one that a camera makes by itself: frames are useless meanwhile.
@@ -57,13 +61,13 @@ void Teller::tell_correction(const StreamStatus& s) {
 }
 
 /// A card full of other files is told every few seconds, not file by file.
-void Teller::tell_passed_over(const StreamStatus& s) {
+void Teller::tell_seldom(const std::string& key, const std::string& words) {
   constexpr auto pause = std::chrono::seconds(3);
-  auto& at = said_at_[s.device];
+  auto& at = said_at_[key];
   const auto now = std::chrono::steady_clock::now();
-  if (s.passed_over == 0 || now - at < pause) return;
-  const std::string key = s.device + " passed over", before = said_[key];
-  say_changed(key, passed_over(s));
+  if (words.empty() || now - at < pause) return;
+  const std::string before = said_[key];
+  say_changed(key, words);
   if (said_[key] != before) at = now;
 }
 

@@ -14,6 +14,8 @@ namespace orbitfuse::cli {
 std::string described(const DeviceInfo& device);
 /// How many files of a camera were no frames, and the last of them; empty: none.
 std::string passed_over(const StreamStatus& stream);
+/// "thermal0: 2 frames arrived damaged, ..."; empty: none.
+std::string damaged(const StreamStatus& stream);
 
 /// Says what came of a key or of a button on the page, and hands it on.
 Result<std::string> tell_outcome(terminal::Console& console, Result<std::string> outcome);
@@ -31,7 +33,7 @@ class Teller {
   void draw();
   void tell_alarms(const StreamStatus& stream);
   void tell_correction(const StreamStatus& stream);
-  void tell_passed_over(const StreamStatus& stream);
+  void tell_seldom(const std::string& key, const std::string& words);
   void tell_guide();
   void say_changed(const std::string& key, const std::string& words);
   void listen();

@@ -17,6 +17,7 @@
 #include "app/stages/measurement_scene.hpp"
 #include "app/stages/metric_scale.hpp"
 #include "app/stages/session_input.hpp"
+#include "capture/recording/session_folder.hpp"
 #include "core/session/session.hpp"
 
 namespace orbitfuse::cli {
@@ -216,16 +217,37 @@ Status inspect_run(Context& context, const fs::path& folder) {
               "run again: what is damaged is made anew");
 }
 
+Status verdict_of(const Session& session, const std::vector<Error>& damaged) {
+  const std::string where = session.folder.string();
+  if (!damaged.empty())
+    return fail(ErrorKind::input, where,
+                fmt::format("{} of {} frames are damaged, first {}", damaged.size(),
+                            session.frames.size(), damaged.front().where),
+                "copy them from the original, or import the session again");
+  if (!session.missing_files.empty())
+    return fail(ErrorKind::input, where,
+                fmt::format("{} of {} frames are missing, first {}", session.missing_files.size(),
+                            session.frames.size() + session.missing_files.size(),
+                            session.missing_files.front()),
+                "copy them from the original, or import the session again; a run goes on without "
+                "them");
+  if (session.lost_lines > 0)
+    return fail(ErrorKind::input, where,
+                fmt::format("{} frames are in no line of the manifest", session.lost_lines),
+                "restore the manifest from a backup; a run goes on without them");
+  return {};
+}
+
 Status inspect_session(Context& context, const fs::path& folder) {
   ORBITFUSE_ASSIGN(const Session session, open_session(folder));
-  context.console.data(
-      fmt::format("session {} of {}{}", session.id, session.created,
-                  session.complete ? "" : ", incomplete: the recorder was stopped"));
-  context.result = {{"session", folder.string()},
-                    {"id", session.id},
-                    {"created", session.created},
-                    {"complete", session.complete},
-                    {"warnings", session.warnings}};
+  const bool recorded_now = !session.complete && is_being_recorded(folder);
+  context.console.data(fmt::format("session {} of {}{}", session.id, session.created,
+                                   recorded_now       ? ", being recorded now"
+                                   : session.complete ? ""
+                                                      : ", incomplete: the recorder was stopped"));
+  context.result = {{"session", folder.string()},     {"id", session.id},
+                    {"created", session.created},     {"complete", session.complete},
+                    {"being_recorded", recorded_now}, {"warnings", session.warnings}};
   for (const Modality modality : {Modality::visible, Modality::thermal}) {
     const json j = describe(session, modality);
     context.result[std::string(name(modality))] = j;
@@ -257,18 +279,8 @@ Status inspect_session(Context& context, const fs::path& folder) {
     context.console.warning("damaged: " + error.message());
   }
   context.result["missing"] = session.missing_files;
-  if (damaged.empty() && !session.missing_files.empty())
-    return fail(ErrorKind::input, folder.string(),
-                fmt::format("{} of {} frames are missing, first {}", session.missing_files.size(),
-                            session.frames.size() + session.missing_files.size(),
-                            session.missing_files.front()),
-                "copy them from the original, or import the session again; a run goes on without "
-                "them");
-  if (damaged.empty()) return {};
-  return fail(ErrorKind::input, folder.string(),
-              fmt::format("{} of {} frames are damaged, first {}", damaged.size(),
-                          session.frames.size(), damaged.front().where),
-              "copy them from the original, or import the session again");
+  context.result["lost_lines"] = session.lost_lines;
+  return verdict_of(session, damaged);
 }
 
 }  // namespace

@@ -107,6 +107,13 @@ Error without_recorded(Error error) {
   return error;
 }
 
+Result<Anchored> ask(const ThermalScene& scene, const Request& request, bool to_keep,
+                     const Progress& progress) {
+  if (to_keep) return measure_anchored(scene, request, progress).map_error(without_recorded);
+  ORBITFUSE_ASSIGN(Answer answer, measure(scene, request, progress).map_error(without_recorded));
+  return Anchored{request, std::move(answer)};
+}
+
 Status run(Context& context, const MeasureArguments& options) {
   if (options.words.csv && context.common.json)
     return fail(ErrorKind::usage, "--csv", "together with --json", "choose one of them");
@@ -135,16 +142,16 @@ Status run(Context& context, const MeasureArguments& options) {
     return {};
   }
   if (words.save) ORBITFUSE_TRY(check_name(request->name));  // before it takes its time
-  ORBITFUSE_ASSIGN(const Answer answer,
-                   measure(scene, *request, context.progress).map_error(without_recorded));
+  ORBITFUSE_ASSIGN(const Anchored measured, ask(scene, *request, words.save, context.progress));
+  const Answer& answer = measured.answer;
   std::string name = request->name;
   if (options.words.save && context.common.dry_run) {
     context.console.info("would be saved in " + file.string());
   } else if (options.words.save) {
     ORBITFUSE_ASSIGN(const Kept kept,
                      add_measurement(file, scene.identity(),
-                                     {name, "", anchored(*request, answer), to_json(answer),
-                                      words.remark, words.component, words.reference}));
+                                     {name, "", measured.request, to_json(answer), words.remark,
+                                      words.component, words.reference}));
     name = kept.name;
     context.console.info(fmt::format("saved as '{}' in {}{}", name, file.string(),
                                      kept.replaced ? ", in place of the one of that name" : ""));

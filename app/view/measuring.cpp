@@ -67,10 +67,11 @@ Result<json> Measuring::add(const json& asked, const std::atomic<bool>* gone) {
   return in_turn([&]() -> Result<json> {
     ORBITFUSE_ASSIGN(const measurement::Request request, measurement::request_of_json(asked));
     ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
-    ORBITFUSE_ASSIGN(const measurement::Answer answer, measure(*scene, request, until(gone)));
-    ORBITFUSE_TRY(measurement::add_measurement(
-        run_.out / measurement::measurements_file, scene->identity(),
-        {request.name, "", measurement::anchored(request, answer), to_json(answer)}));
+    ORBITFUSE_ASSIGN(const measurement::Anchored kept,
+                     measure_anchored(*scene, request, until(gone)));
+    ORBITFUSE_TRY(
+        measurement::add_measurement(run_.out / measurement::measurements_file, scene->identity(),
+                                     {request.name, "", kept.request, to_json(kept.answer)}));
     return list();
   });
 }

@@ -19,6 +19,7 @@ Json json_of(const StreamStatus& s, double rate_hz) {
   json["away_s"] = s.away ? Json(s.away->seconds) : Json();
   json["correction"] = s.correction;
   json["corrections"] = s.corrections;
+  json["rejected_last"] = s.rejected_last;
   json["passed_over_last"] = s.passed_over_last;
   json["silent"] = s.silent;
   json["ended"] = s.ended;
@@ -51,6 +52,13 @@ Json json_of(const LiveCamera& camera) {
 }
 
 }  // namespace
+
+std::string damaged_words(const StreamStatus& s) {
+  std::string words = s.rejected == 1
+                          ? "1 frame arrived damaged and counts as lost"
+                          : fmt::format("{} frames arrived damaged and count as lost", s.rejected);
+  return s.rejected_last.empty() ? words : words + ", last " + s.rejected_last;
+}
 
 std::string account_words(const StreamStatus& s) {
   std::string words = fmt::format("{} received, {} lost ({} missing, {} rejected, {} dropped",
@@ -102,8 +110,7 @@ std::vector<std::string> warnings_of(const LiveState& state) {
                                  s.unwritten));
     if (s.missing > 0)
       list.push_back(fmt::format("{}: {} frames lost on the way", s.device, s.missing));
-    if (s.rejected > 0)
-      list.push_back(fmt::format("{}: {} frames arrived damaged", s.device, s.rejected));
+    if (s.rejected > 0) list.push_back(s.device + ": " + damaged_words(s));
   }
   if (state.free_bytes < little_disk_bytes) {
     list.push_back(fmt::format("{:.1f} GiB left on the disk",

@@ -34,6 +34,8 @@ std::vector<std::string> warnings_of(const LiveState& state);
 
 /// The same in words: "90 received, 10 lost (5 missing, 3 rejected, 2 dropped)".
 std::string account_words(const StreamStatus& stream);
+/// "3 frames arrived damaged and count as lost, last IMG_4.jpg: not a JPEG". There is one.
+std::string damaged_words(const StreamStatus& stream);
 
 /// What came of a stream and what was lost, and the span of its ids (null before its first frame).
 nlohmann::json account_json(const StreamStatus& stream);

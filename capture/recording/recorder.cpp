@@ -118,7 +118,7 @@ struct Recorder::Channel {
         } else if (delivery.kind == Delivery::Kind::frame) {
           push(std::move(delivery.frame));
         } else {
-          account.lose(id, Loss::rejected, "rejected: " + delivery.reason);
+          account.lose(id, Loss::rejected, rejected_because + delivery.reason);
         }
         break;
       }
@@ -236,7 +236,7 @@ struct Recorder::Channel {
     tell_what_is_known();
     const Result<StoredFrame> stored = writer.store(device.id, frame);
     if (!stored && stored.error().kind == ErrorKind::input) {
-      account.lose(frame.id, Loss::rejected, "rejected: " + stored.error().found);
+      account.lose(frame.id, Loss::rejected, rejected_because + stored.error().found);
       return;
     }
     if (!stored) return give_up(frame, stored.error());

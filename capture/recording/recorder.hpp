@@ -60,7 +60,8 @@ struct StreamStatus {
   std::optional<Absence> away;                ///< at the end: until the end
   std::uint64_t passed_over = 0;              ///< files that were no frames
   std::vector<std::string> passed_over_last;  ///< up to three: name and why
-  std::uint64_t repeated = 0;                 ///< frames that came again under a settled number
+  std::string rejected_last;   ///< the newest that came damaged: why, of files with the name
+  std::uint64_t repeated = 0;  ///< frames that came again under a settled number
   std::string notice;  ///< what the operator should look into: "moved", "twin", "look-alike", ...
   /// The latest word on shutter corrections, and how many there were.
   std::string correction;

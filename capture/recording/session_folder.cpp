@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "capture/recording/session_folder.hpp"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <cerrno>
 
@@ -50,6 +53,14 @@ bool holds_only_a_begun_manifest(const fs::path& folder) {
 }
 
 }  // namespace
+
+bool is_being_recorded(const fs::path& folder) {
+  const int fd = ::open((folder / "manifest.jsonl").c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (fd < 0) return false;
+  const bool taken = ::flock(fd, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  ::close(fd);
+  return taken;
+}
 
 std::optional<std::uint64_t> free_bytes_at(const fs::path& folder) {
   std::error_code error;

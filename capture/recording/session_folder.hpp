@@ -24,6 +24,9 @@ Status check_free_space(const std::filesystem::path& folder, std::uint64_t neede
 
 bool holds_session(const std::filesystem::path& folder);
 
+/// Whether a process has the session open for recording. False where the folder can't be asked.
+bool is_being_recorded(const std::filesystem::path& folder);
+
 /// The folder must not exist or be empty. Input error otherwise.
 Status check_is_new(const std::filesystem::path& folder);
 

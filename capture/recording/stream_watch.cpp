@@ -39,6 +39,7 @@ void StreamWatch::see(const Delivery& delivery, std::chrono::milliseconds silenc
 }
 
 void StreamWatch::note(const Delivery& delivery) {
+  if (delivery.kind == Delivery::Kind::rejected) rejected_last_ = delivery.reason;
   if (delivery.kind != Delivery::Kind::event) return;
   if (asks_for_operator(delivery.event)) notice_ = delivery.detail;
   if (loses_stream(delivery.event)) outage_ = Outage{last_frame_, delivery.detail};
@@ -85,6 +86,7 @@ void StreamWatch::tell(StreamStatus& status) const {
   status.away = away();
   status.passed_over = passed_over_;
   status.passed_over_last = passed_over_last_;
+  status.rejected_last = rejected_last_;
   status.repeated = repeated_;
   status.notice = notice_;
   status.correction = correction_;

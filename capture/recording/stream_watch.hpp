@@ -28,7 +28,8 @@ class StreamWatch {
 
   /// The outage that the camera has not come back from.
   std::optional<Absence> away() const;
-  /// Fills what is known here: silent, away, passed over, repeated, notice, correction.
+  /// Fills what is known here: silent, away, passed over, rejected last, repeated, notice,
+  /// correction.
   void tell(StreamStatus& status) const;
 
  private:
@@ -41,7 +42,7 @@ class StreamWatch {
   std::optional<Outage> outage_;
   std::optional<Clock::time_point> over_at_;
   Clock::time_point last_frame_ = Clock::now();
-  std::string notice_, correction_;
+  std::string notice_, correction_, rejected_last_;
   std::uint64_t passed_over_ = 0, repeated_ = 0, corrections_ = 0;
   std::vector<std::string> passed_over_last_;
 };

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/nested_text.hpp"
+#include "core/session/lost_lines.hpp"
 #include "core/session/manifest_json.hpp"
 #include "core/system/file_io.hpp"
 
@@ -194,6 +195,13 @@ Result<Session> open_session(const std::filesystem::path& folder) {
                   frame.file + " is of unknown device \"" + frame.device + "\"",
                   "restore the manifest from a backup");
     }
+  }
+  for (const LostLines& lost : lost_lines(session)) {
+    session.lost_lines += lost.count;
+    session.warnings.push_back(fmt::format(
+        "{}: {} of its frames {} in no line of the manifest, first id {}: lines were removed or "
+        "lost",
+        lost.device, lost.count, lost.count == 1 ? "is" : "are", lost.first_sequence));
   }
   ORBITFUSE_TRY(drop_missing_files(session));
   if (!session.complete)

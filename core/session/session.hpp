@@ -119,7 +119,8 @@ struct Session {
   std::vector<EventRecord> events;
   bool complete = false;                   ///< the recorder closed it properly
   std::vector<std::string> missing_files;  ///< listed in the manifest; no frames of this session
-  std::vector<std::string> warnings;       ///< e.g. a cut last manifest line, a missing file
+  std::uint64_t lost_lines = 0;       ///< ids of streams for which no line stands (lost_lines.hpp)
+  std::vector<std::string> warnings;  ///< e.g. a cut last manifest line, a missing file
 
   std::filesystem::path path_of(const FrameRecord& frame) const { return folder / frame.file; }
   const DeviceInfo* device(const std::string& id) const;

@@ -45,10 +45,9 @@ class ReplaySource : public FrameSource {
   }
 
   /// Goes on after the last frame that the earlier recording has, in that recording's count.
-  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames,
-              std::uint64_t next_id) override {
+  bool resume(const Earlier& earlier) override {
     std::map<std::pair<std::string, std::optional<std::int64_t>>, std::uint64_t> recorded;
-    for (const FrameRecord& frame : frames)
+    for (const FrameRecord& frame : earlier.frames)
       recorded[{frame.content_hash, frame.host_time_ns}] = frame.sequence;
     const auto sequence_of = [&](const FrameRecord& record) -> const std::uint64_t* {
       const auto found = recorded.find({record.content_hash, record.host_time_ns});
@@ -60,7 +59,7 @@ class ReplaySource : public FrameSource {
       if (!sequence) continue;
       ++known;
       next_ = i + 1;
-      ids_.go_on(records_[i].sequence, *sequence, next_id);
+      ids_.go_on(records_[i].sequence, *sequence, earlier.next_id);
     }
     if (known == 0) return false;
     first_ = std::min(next_, records_.size() - 1);

@@ -73,17 +73,17 @@ Status WatchSource::start() {
   return reader_->watch.open(options_.existing);
 }
 
-bool WatchSource::resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,
-                         std::uint64_t) {
+bool WatchSource::resume(const Earlier& earlier) {
   const std::lock_guard lock(mutex_);
   const std::string id = info_.id;
-  info_ = device;
+  info_ = earlier.device;
   info_.id = id;
-  resumed_ = !device.model.empty() || !device.serial.empty();
-  for (const FrameRecord& frame : frames) {
+  resumed_ = !info_.model.empty() || !info_.serial.empty();
+  for (const FrameRecord& frame : earlier.frames) {
     seen_hashes_.insert(frame.content_hash);
     seen_files_.insert({frame.source, frame.host_time_ns});  // thermal images are stored decoded
   }
+  for (const GapRecord& gap : earlier.gaps) rejected_before_.insert(gap.reason);
   return false;
 }
 
@@ -94,8 +94,10 @@ void WatchSource::store_no_finer_than(double kelvin_per_count) {
 Delivery WatchSource::rejection(const std::string& name, const std::string& why) {
   Delivery delivery;
   delivery.kind = Delivery::Kind::rejected;
-  delivery.frame.id = next_id_++;
   delivery.reason = name + ": " + why;
+  if (rejected_before_.contains(rejected_because + delivery.reason))
+    return event_delivery(EventKind::ignored, delivery.reason + ", as before");
+  delivery.frame.id = next_id_++;
   return delivery;
 }
 
@@ -181,6 +183,9 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     std::error_code error;
     if (!fs::exists(attempt.file, error))
       return event_delivery(EventKind::ignored, name + ": vanished before it was read");
+    // Where one camera writes both into one folder, half of the files are such.
+    if (thermal && !radiometric && read_visible_still(attempt.file))
+      return event_delivery(EventKind::ignored, name + ": a photo, no thermal image");
     if (Clock::now() - attempt.first_try < options_.give_up) {
       attempt.next_try = Clock::now() + retry_every;
       attempt.why = still.error().found;
@@ -207,27 +212,22 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   if (seen_files_.contains({delivery.frame.source, delivery.frame.host_time_ns})) {
     return event_delivery(EventKind::duplicate, name + ": in the session already");
   }
-  delivery.frame.id = next_id_++;
   {
     const std::lock_guard lock(mutex_);
-    if (resumed_ && (still->camera.model != info_.model || still->camera.serial != info_.serial)) {
-      delivery.kind = Delivery::Kind::rejected;
-      delivery.reason = name + ": of " + still->camera.model + " " + still->camera.serial +
-                        ", the session's are of " + info_.model + " " + info_.serial;
-      return delivery;
-    }
+    if (resumed_ && (still->camera.model != info_.model || still->camera.serial != info_.serial))
+      return rejection(name, "of " + still->camera.model + " " + still->camera.serial +
+                                 ", the session's are of " + info_.model + " " + info_.serial);
     if (camera_key_.empty()) {
       camera_key_ = still->key();
       info_.model = still->camera.model;
       info_.serial = still->camera.serial;
       info_.lens = still->camera.lens;
     } else if (still->key() != camera_key_) {
-      delivery.kind = Delivery::Kind::rejected;
-      delivery.reason = name + ": another camera, lens or image size than the first (" +
-                        still->described() + "; give it a folder of its own)";
-      return delivery;
+      return rejection(name, "another camera, lens or image size than the first (" +
+                                 still->described() + "; give it a folder of its own)");
     }
   }
+  delivery.frame.id = next_id_++;
   delivery.kind = Delivery::Kind::frame;
   delivery.frame.flag(FrameFlag::still);
   tell(*still, name, delivery.frame);

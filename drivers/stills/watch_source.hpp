@@ -39,7 +39,8 @@ struct WatchOptions {
 /// over (event "ignored"), so that one folder can serve a visible and a thermal source. All photos
 /// of one source are of one camera, lens and size, because they share intrinsics: others are
 /// rejected. After resume() neither photos of the earlier recording nor those of another camera
-/// come. Frames carry the flag "still". Files are read, never changed.
+/// come, and what it rejected is passed over while it is as damaged as it was. Frames carry the
+/// flag "still". Files are read, never changed.
 class WatchSource final : public FrameSource {
  public:
   explicit WatchSource(WatchOptions options);
@@ -52,8 +53,7 @@ class WatchSource final : public FrameSource {
   void stop() override;
   std::vector<Delivery> unfinished() override;
   bool can_wait() const override { return true; }
-  bool resume(const DeviceInfo& device, const std::vector<FrameRecord>& frames,
-              std::uint64_t next_id) override;
+  bool resume(const Earlier& earlier) override;
   void store_no_finer_than(double kelvin_per_count) override;
 
  private:
@@ -63,6 +63,7 @@ class WatchSource final : public FrameSource {
     std::chrono::steady_clock::time_point first_try, next_try;
     std::optional<std::string> why = {};  ///< it could not be read, if it was tried
   };
+  /// Or an event "ignored", where an earlier recording rejected it for the same.
   Delivery rejection(const std::string& name, const std::string& why);
   std::optional<Delivery> take(Attempt attempt);
   /// Flags the frame of a file, and tells what of the file is not as it looks.
@@ -78,8 +79,9 @@ class WatchSource final : public FrameSource {
   std::deque<Attempt> queue_;
   std::set<std::string> seen_hashes_;
   std::set<std::pair<std::string, std::optional<std::int64_t>>>
-      seen_files_;        ///< of an earlier recording: name, time
-  bool resumed_ = false;  ///< info_ is the session's word
+      seen_files_;                         ///< of an earlier recording: name, time
+  std::set<std::string> rejected_before_;  ///< GapRecord::reason
+  bool resumed_ = false;                   ///< info_ is the session's word
   std::uint64_t next_id_ = 0;
   bool gone_told_ = false;
   std::set<std::string> told_;    ///< matters

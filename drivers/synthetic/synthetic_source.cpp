@@ -48,8 +48,8 @@ class SyntheticSource : public FrameSource {
   }
 
   /// Goes on after the last frame of the same walk that the earlier recording has.
-  bool resume(const DeviceInfo&, const std::vector<FrameRecord>& frames,
-              std::uint64_t next_id) override {
+  bool resume(const Earlier& earlier) override {
+    const std::vector<FrameRecord>& frames = earlier.frames;
     std::size_t known = 0;
     for (std::size_t i = 0; i < walk_.size(); ++i) {
       const auto found = std::find_if(frames.begin(), frames.end(),
@@ -57,7 +57,7 @@ class SyntheticSource : public FrameSource {
       if (found == frames.end()) continue;
       ++known;
       next_ = i + 1;
-      ids_.go_on(i, found->sequence, next_id);
+      ids_.go_on(i, found->sequence, earlier.next_id);
     }
     if (known == 0) return false;
     resumed_ = resumed_event(known, walk_.size(), next_ == walk_.size());

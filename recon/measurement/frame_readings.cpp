@@ -110,7 +110,7 @@ Result<std::optional<FrameReading>> read_frame(const ThermalScene& scene, std::s
   const double stored_k = bilinear(image, reading.pixel);
   reading.temperature_k = radiometry.frame_k(index, stored_k);
   if (!std::isfinite(reading.temperature_k)) {
-    why = Hidden::no_temperature;
+    why = std::isfinite(stored_k) ? Hidden::impossible_parameters : Hidden::no_temperature;
     return std::nullopt;
   }
   reading.gain = radiometry.gain(index, stored_k);
@@ -129,9 +129,13 @@ Result<std::optional<FrameReading>> read_frame(const ThermalScene& scene, std::s
 
 std::string PointReadings::why_hidden() const {
   constexpr const char* words[hidden_kinds] = {
-      "have it behind them",           "outside of their picture",
-      "too flat to the surface",       "occluded",
-      "no surface of the field there", "no temperature there"};
+      "have it behind them",
+      "outside of their picture",
+      "too flat to the surface",
+      "occluded",
+      "no surface of the field there",
+      "no temperature there",
+      "no temperature by the object parameters asked for (surroundings alone would be as bright)"};
   std::string text;
   for (std::size_t i = 0; i < hidden_kinds; ++i)
     if (hidden[i] > 0)

@@ -25,8 +25,17 @@ struct FrameReading {
 };
 
 /// Why a frame doesn't see a point.
-enum class Hidden { behind_camera, outside_picture, grazing, occluded, no_surface, no_temperature };
-inline constexpr std::size_t hidden_kinds = 6;
+enum class Hidden {
+  behind_camera,
+  outside_picture,
+  grazing,
+  occluded,
+  no_surface,
+  no_temperature,
+  /// Nothing as warm as the sensor saw it can be of these object parameters.
+  impossible_parameters
+};
+inline constexpr std::size_t hidden_kinds = 7;
 
 struct PointReadings {
   std::vector<FrameReading> frames;

@@ -401,4 +401,31 @@ Result<Answer> measure(const ThermalScene& scene, const Request& request,
   return answer;
 }
 
+namespace {
+
+bool has_pixel_spots(const Request& request) {
+  if (request.kind == Kind::difference)
+    return std::any_of(request.of.begin(), request.of.end(), has_pixel_spots);
+  return request.kind == Kind::spot && std::holds_alternative<PixelPlace>(request.places[0]);
+}
+
+/// A line's points may be seen best from another view than the one that it was drawn in.
+bool has_only_spots(const Request& request) {
+  return request.kind == Kind::spot ||
+         (request.kind == Kind::difference &&
+          std::all_of(request.of.begin(), request.of.end(), has_only_spots));
+}
+
+}  // namespace
+
+Result<Anchored> measure_anchored(const ThermalScene& scene, const Request& request,
+                                  const Progress& progress) {
+  ORBITFUSE_ASSIGN(Answer answer, measure(scene, request, progress));
+  Request kept = anchored(request, answer);
+  if (has_only_spots(request) && has_pixel_spots(request)) {
+    ORBITFUSE_ASSIGN(answer, measure(scene, kept, progress));
+  }
+  return Anchored{std::move(kept), std::move(answer)};
+}
+
 }  // namespace orbitfuse::measurement

@@ -16,6 +16,16 @@ Result<Answer> measure(const ThermalScene& scene, const Request& request, const 
 /// because a view's name may stand for another camera when the run renders anew. Polygons stay.
 Request anchored(Request request, const Answer& answer);
 
+/// A measurement to keep: the anchored() request, and what it answers. Of spots that is not quite
+/// what their pixels answered, whose view alone gave the surface's normal: asked again, or as a
+/// part of a difference, what is kept gives the same figures. Errors: as measure().
+struct Anchored {
+  Request request;
+  Answer answer;
+};
+Result<Anchored> measure_anchored(const ThermalScene& scene, const Request& request,
+                                  const Progress& progress);
+
 /// The surface at a place: of a point, with the normal that the frames which see it agree on and a
 /// NaN field_k where none does. Errors: as measure().
 Result<SurfacePoint> surface_of(const ThermalScene& scene, const Place& place,

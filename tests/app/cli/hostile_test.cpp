@@ -303,7 +303,8 @@ TEST_F(Hostile, EmptyValuesAreNoValues) {
 TEST_F(Hostile, NumbersAreNamedAsTheyWereTyped) {
   put_pair();
   const std::pair<std::vector<std::string>, std::string> cases[] = {
-      {{"--humidity", "900"}, "--humidity: 900; choose 0 to 100"},
+      {{"--humidity", "900"}, "--humidity: 900; choose 1 to 100"},
+      {{"--humidity", "0.5"}, "--humidity: 0.5; choose 1 to 100"},
       {{"--reflected-c", "-300"}, "--reflected-c: -300"},
       {{"--emissivity", "1.5"}, "--emissivity: 1.5"},
       {{"--station-spacing-deg", "0"}, "--station-spacing-deg: 0; choose 1 to 180"},
@@ -366,6 +367,19 @@ TEST_F(Hostile, InspectMissesFramesThatAreGone) {
   EXPECT_EQ(outcome.code, 3);
   EXPECT_EQ(outcome.result().at("missing"), nlohmann::json({"thermal/000001.tiff"}));
   EXPECT_THAT(outcome.err, AllOf(HasSubstr("1 of 24 frames are missing"), HasSubstr("copy them")));
+}
+
+TEST_F(Hostile, InspectMissesLinesThatAreGone) {
+  write_fixture_session(path("s"));
+  std::string text = *read_file(path("s/manifest.jsonl"));
+  const std::size_t named = text.find("thermal/000001.tiff"), begin = text.rfind('\n', named) + 1;
+  text.erase(begin, text.find('\n', named) + 1 - begin);
+  test::put(path("s/manifest.jsonl"), text);
+  const Outcome outcome = orbitfuse_program({"inspect", path("s"), "--json"});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_EQ(outcome.result().at("lost_lines"), 1);
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("1 of its frames is in no line of the manifest"),
+                                 HasSubstr("restore the manifest")));
 }
 
 TEST_F(Hostile, ExchangedFramesAreToldAndEditedOnesNamed) {

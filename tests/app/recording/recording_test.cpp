@@ -363,6 +363,29 @@ TEST(Recording, PicturesAreShownBeforeTheStartAndNothingIsRecorded) {
   EXPECT_GT(session.streams[0].first_sequence, 0u);
 }
 
+/// On the page of a replay, as Ctrl-C at the terminal.
+TEST(Recording, AStopCutsAReplayShortAndTheSessionSaysSo) {
+  const test::TempFolder folder;
+  RecordingOptions options;
+  options.session = folder / "s";
+  for (const bool live : {false, true}) {
+    options.session = folder / (live ? "live" : "replay");
+    options.live = live;
+    std::vector<std::unique_ptr<FrameSource>> sources;
+    sources.push_back(std::make_unique<LiveCameraSource>());
+    Recording recording(std::move(sources), options);
+    ASSERT_TRUE(recording.prepare());
+    const auto ending = recording.run(nullptr, [&] {
+      if (recording.latest(Modality::thermal)) (void)recording.request_stop();
+    });
+    EXPECT_EQ(ending.has_value(), live);
+    if (!ending) {
+      EXPECT_EQ(ending.error().kind, ErrorKind::cancelled) << ending.error().message();
+    }
+    EXPECT_EQ(open_session(options.session)->complete, live);
+  }
+}
+
 TEST(Recording, ACorrectionThatNoCameraHasIsRefusedWithTheReason) {
   const test::TempFolder folder;
   RecordingOptions options;

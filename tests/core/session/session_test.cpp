@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "core/session/session.hpp"
 
+#include "core/session/lost_lines.hpp"
 #include "core/session/manifest_json.hpp"
 
 #include <fmt/format.h>
@@ -49,9 +50,10 @@ std::string manifest() {
   device.lens.calibrated = Camera::from_fov(640, 480, 25);
   return manifest_header_line(session) + "\n" + manifest_line(device) + "\n" +
          manifest_line(full_frame()) + "\n" +
-         manifest_line(GapRecord{"thermal0", 3, 9, "missing"}) + "\n" +
-         manifest_line(StreamRecord{"thermal0", 1, 20, 11, 9}) + "\n" +
-         manifest_line(EventRecord{"thermal0", 77, "nuc", "shutter"}) + "\n" +
+         manifest_line(GapRecord{"thermal0", full_frame().sequence - 9, 9, "missing"}) + "\n" +
+         manifest_line(
+             StreamRecord{"thermal0", full_frame().sequence - 9, full_frame().sequence, 1, 9}) +
+         "\n" + manifest_line(EventRecord{"thermal0", 77, "nuc", "shutter"}) + "\n" +
          manifest_end_line(session) + "\n";
 }
 
@@ -92,10 +94,45 @@ TEST_F(SessionTest, EveryFieldComesBack) {
   EXPECT_EQ(f.quality->edge_blur->sigma_px, 1.25);
   EXPECT_EQ(f.quality->edge_blur->edges, 70);
   EXPECT_EQ(s->gaps[0].count, 9u);
-  EXPECT_EQ(s->streams[0].received + s->streams[0].lost, 20u);
+  EXPECT_EQ(s->streams[0].received + s->streams[0].lost, 10u);
   EXPECT_EQ(s->events[0].kind, "nuc");
   EXPECT_TRUE(s->frames_of(Modality::thermal, false).empty());
   EXPECT_EQ(s->frames_of(Modality::thermal).size(), 1u);
+}
+
+TEST_F(SessionTest, LinesThatWereRemovedAreMissed) {
+  const std::string text = manifest();
+  for (const std::string& line :
+       {manifest_line(full_frame()),
+        manifest_line(GapRecord{"thermal0", full_frame().sequence - 9, 9, "missing"})}) {
+    std::string without = text;
+    without.erase(without.find(line), line.size() + 1);
+    const auto s = open(without);
+    ASSERT_TRUE(s) << s.error().message();
+    EXPECT_EQ(s->lost_lines, s->frames.empty() ? 1u : 9u);
+    ASSERT_EQ(s->warnings.size(), 1u);
+    EXPECT_NE(s->warnings[0].find("in no line of the manifest"), std::string::npos);
+  }
+}
+
+TEST_F(SessionTest, LinesOfARecordingThatWasCutAreMissedBetweenTheOthers) {
+  Session session;
+  for (const std::uint64_t id : {4u, 5u, 8u, 9u}) {
+    FrameRecord frame;
+    frame.device = "visible0";
+    frame.sequence = id;
+    session.frames.push_back(frame);
+  }
+  session.gaps.push_back({"visible0", 6, 1, "missing"});
+  session.gaps.push_back({"thermal0", 2, 3, "missing"});  // whole
+  const auto lost = lost_lines(session);
+  ASSERT_EQ(lost.size(), 1u);
+  EXPECT_EQ(lost[0].device, "visible0");
+  EXPECT_EQ(lost[0].first_sequence, 7u);
+  EXPECT_EQ(lost[0].count, 1u);
+  session.streams.push_back({"visible0", 1, 12, 12, 0});
+  EXPECT_EQ(lost_lines(session)[0].count, 3u + 1 + 3);
+  EXPECT_TRUE(lost_lines(Session()).empty());
 }
 
 TEST_F(SessionTest, TimesThatNobodyKnowsAreAbsent) {

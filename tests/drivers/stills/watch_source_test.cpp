@@ -218,7 +218,7 @@ TEST_F(WatchTest, ResumedSessionGetsNoPhotoTwice) {
   ASSERT_TRUE(source.start());
   DeviceInfo known;
   known.id = "visible0";
-  source.resume(known, recorded, 3);
+  source.resume({known, recorded, {}, 3});
   int frames = 0, duplicates = 0;
   for (int i = 0; i < 4; ++i) {
     const Delivery delivery = soon(source);
@@ -237,13 +237,48 @@ TEST_F(WatchTest, ResumedSessionTakesNoOtherCamera) {
   ASSERT_TRUE(source.start());
   DeviceInfo known;
   known.model = "Phone 9";
-  source.resume(known, {}, 0);
+  source.resume({known, {}, {}, 0});
   EXPECT_EQ(source.describe().model, "Phone 9");
   EXPECT_EQ(source.describe().id, options.device_id);
   put("IMG_1.jpg", photo(1));  // says of no camera at all
   const Delivery delivery = soon(source);
   EXPECT_EQ(delivery.kind, Delivery::Kind::rejected);
   EXPECT_THAT(delivery.reason, HasSubstr("Phone 9"));
+}
+
+TEST_F(WatchTest, WhatWasRejectedIsNotCountedAgain) {
+  const std::string cut = photo(1).substr(0, 400);
+  put("IMG_1.jpg", cut);
+  options.existing = true;
+  std::string reason;
+  {
+    WatchSource source(options);
+    ASSERT_TRUE(source.start());
+    const Delivery delivery = soon(source);
+    ASSERT_EQ(delivery.kind, Delivery::Kind::rejected);
+    EXPECT_THAT(delivery.reason, HasSubstr("IMG_1.jpg"));
+    reason = delivery.reason;
+  }
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  source.resume({source.describe(), {}, {{"visible0", 0, 1, rejected_because + reason}}, 1});
+  const Delivery again = soon(source);
+  EXPECT_EQ(again.reason, "ignored");
+  EXPECT_THAT(again.detail, HasSubstr("as before"));
+  put("IMG_1.jpg", photo(1));  // copied anew, whole
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
+}
+
+TEST_F(WatchTest, APhotoAmongThermalImagesIsPassedOver) {
+  options.modality = Modality::thermal;
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  put("IMG_1.jpg", photo(1));
+  const Delivery delivery = soon(source);
+  EXPECT_EQ(delivery.reason, "ignored") << delivery.reason;
+  EXPECT_THAT(delivery.detail, HasSubstr("IMG_1.jpg: a photo"));
+  put("IMG_2.jpg", photo(2).substr(0, 400));
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::rejected) << "cut off: nobody knows what it was";
 }
 
 TEST_F(WatchTest, ExistingPhotosComeInNaturalOrder) {

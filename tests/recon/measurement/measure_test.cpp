@@ -574,6 +574,37 @@ TEST(Measure, WhatIsKeptNamesPointsNotPixels) {
   EXPECT_EQ(to_json(anchored(kept, ask(scene, kept))), to_json(kept)) << "again: it stays there";
 }
 
+TEST(Measure, WhatIsKeptOfASpotIsWhatItAnswersAgain) {
+  const ThermalScene scene = box_orbit();
+  const PosedView& view = scene.frames()[0].view;
+  Request spot, difference;
+  spot.places = {PixelPlace{
+      view.name, view.camera.project(view.cam_from_world * Eigen::Vector3d(0.4, 0.02, 0.01))}};
+  const auto kept = measure_anchored(scene, spot, {});
+  ASSERT_TRUE(kept) << kept.error().message();
+  difference.kind = Kind::difference;
+  difference.of = {kept->request, spot};
+  EXPECT_EQ(to_json(kept->answer), to_json(ask(scene, kept->request)));
+  EXPECT_EQ(to_json(kept->answer), to_json(ask(scene, difference).of[0]));
+  const auto both = measure_anchored(scene, difference, {});
+  ASSERT_TRUE(both) << both.error().message();
+  EXPECT_EQ(to_json(both->answer), to_json(ask(scene, both->request)));
+}
+
+TEST(Measure, ParametersThatNothingCanHaveAreBlamed) {
+  const ThermalScene scene = box_orbit();
+  Request spot;
+  spot.places = {Eigen::Vector3d(0.4, 0.02, 0.01)};
+  ASSERT_TRUE(ask(scene, spot).reading.seen());
+  spot.recorded.emissivity = 0.95;
+  spot.object.emissivity = 0.1;
+  spot.object.reflected_temperature_k = 600;
+  const Answer answer = ask(scene, spot);
+  EXPECT_FALSE(answer.reading.seen());
+  EXPECT_THAT(answer.reading.hidden, HasSubstr("no temperature by the object parameters"));
+  EXPECT_THAT(answer.reading.hidden, testing::Not(HasSubstr("no temperature there")));
+}
+
 TEST(Measure, OnlyParametersThatAreKnownToDifferAreSaidToDiffer) {
   const UsedParameters recorded{0.95, 293.15, "emissivity 0.95 as recorded"},
       asked{0.95, 293.15, "emissivity 0.95 as asked"},
