@@ -183,9 +183,9 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
     std::error_code error;
     if (!fs::exists(attempt.file, error))
       return event_delivery(EventKind::ignored, name + ": vanished before it was read");
-    // Where one camera writes both into one folder, half of the files are such.
+    // A photo: where one camera writes both into one folder, half of the files are such.
     if (thermal && !radiometric && read_visible_still(attempt.file))
-      return event_delivery(EventKind::ignored, name + ": a photo, no thermal image");
+      return event_delivery(EventKind::ignored, name + ": " + still.error().found);
     if (Clock::now() - attempt.first_try < options_.give_up) {
       attempt.next_try = Clock::now() + retry_every;
       attempt.why = still.error().found;

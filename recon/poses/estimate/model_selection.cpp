@@ -5,7 +5,9 @@
 
 #include <utility>
 
+#include "recon/poses/estimate/mistaken_pairs.hpp"
 #include "recon/poses/sfm/held_matches.hpp"
+#include "recon/poses/world_frame.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -74,13 +76,16 @@ bool ModelSelection::only_too_small(const JudgedModel& judged, PoseOptions optio
 
 /// Whether the level's verified matches speak against the model, which then is not believed: on
 /// repeated structure a wrong model has small residuals, for it keeps the matches that fit it.
-bool ModelSelection::matches_contradict(const FeatureLevel& level, JudgedModel& judged) {
+bool ModelSelection::matches_contradict(const FeatureLevel& level, JudgedModel& judged) const {
   const auto graph = level.graph();
   if (!graph) {
     judged.why += ", its matches can't be asked: " + graph.error().found;
     return false;
   }
-  const HeldMatches held = held_matches(*graph, posed_frames(*graph, judged.poses.reconstruction));
+  const std::vector<PosedView>& views = judged.poses.reconstruction.views;
+  const PosedFrames posed = posed_frames(*graph, judged.poses.reconstruction);
+  const HeldMatches held = held_matches(
+      *graph, posed, mistaken_pairs(*graph, posed, fit_stations(views, session_), views.size()));
   judged.poses.gates["held_matches"] = held.share;
   judged.poses.gates["contradicted_matches"] = held.contradicted_share;
   judged.why += fmt::format(", {:.0f} % of the matches of pairs hold", 100 * held.share);
@@ -89,6 +94,8 @@ bool ModelSelection::matches_contradict(const FeatureLevel& level, JudgedModel& 
                               100 * held.contradicted_share, held.contradicted);
   if (held.outvoted > 0)
     judged.why += fmt::format(", {} pairs that do are outvoted", held.outvoted);
+  if (held.mistaken > 0)
+    judged.why += fmt::format(", {} pairs that do contradict the stations as well", held.mistaken);
   if (held.contradict()) judged.believed = false;
   return held.contradict();
 }

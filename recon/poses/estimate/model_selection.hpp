@@ -46,7 +46,7 @@ class ModelSelection {
 
  private:
   bool only_too_small(const JudgedModel& judged, PoseOptions options) const;
-  static bool matches_contradict(const FeatureLevel& level, JudgedModel& judged);
+  bool matches_contradict(const FeatureLevel& level, JudgedModel& judged) const;
   LadderStep fallen(const std::string& attempt, const std::string& why) const;
   void record(LadderStep step);
 

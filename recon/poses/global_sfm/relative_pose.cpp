@@ -84,10 +84,16 @@ NormalisedMatches without(const NormalisedMatches& given, const std::vector<std:
 
 std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPair& pair,
                                          const RelativePoseOptions& options) {
-  std::vector<RelativePose> found;
   const auto proposed = graph.proposed.find(pair);
-  if (proposed == graph.proposed.end()) return found;
-  NormalisedMatches given = normalised(graph, pair, proposed->second);
+  if (proposed == graph.proposed.end()) return {};
+  return relative_poses(graph, pair, proposed->second, options);
+}
+
+std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPair& pair,
+                                         const std::vector<FeatureMatch>& matches,
+                                         const RelativePoseOptions& options) {
+  std::vector<RelativePose> found;
+  NormalisedMatches given = normalised(graph, pair, matches);
   const double threshold =
       options.max_error_px * graph.pixel_scale / graph.cameras[at(pair.first)].fx;
   std::vector<std::uint8_t> used;

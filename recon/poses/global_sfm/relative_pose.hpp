@@ -26,7 +26,11 @@ struct RelativePoseOptions {
   double min_parallax_deg = 1.0;
 };
 
-/// Answers for a pair's proposed matches, the one with most matches first.
+/// Answers for a pair's matches, the one with most matches first.
+std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPair& pair,
+                                         const std::vector<FeatureMatch>& matches,
+                                         const RelativePoseOptions& options);
+/// For its proposed matches.
 std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPair& pair,
                                          const RelativePoseOptions& options);
 

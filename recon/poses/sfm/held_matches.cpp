@@ -73,7 +73,8 @@ std::vector<PairVote> votes_of(const FeatureGraph& graph, const PosedFrames& pos
   return votes;
 }
 
-HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed) {
+HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed,
+                         const PairQuestion& mistaken) {
   HeldMatches result;
   const std::vector<PairVote> votes = votes_of(graph, posed);
   Bonds bonds(at(graph.count()));
@@ -91,6 +92,10 @@ HeldMatches held_matches(const FeatureGraph& graph, const PosedFrames& posed) {
     const int enough = static_cast<int>(against / outweighs) + 1;
     if (matches_joining(bonds, vote.pair.first, vote.pair.second, enough) >= enough) {
       ++result.outvoted;
+      continue;
+    }
+    if (mistaken && mistaken(vote)) {
+      ++result.mistaken;
       continue;
     }
     ++result.contradicted;

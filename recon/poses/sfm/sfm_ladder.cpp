@@ -215,10 +215,16 @@ tl::unexpected<Error> none_held(const std::vector<LadderStep>& steps, Modality m
     found = fmt::format("none of {} attempts held ({}); the nearest, {}", steps.size(),
                         listed ? std::string("each of them: ") + attempts_file : list, found);
   }
+  const bool beside_visible = std::any_of(steps.begin(), steps.end(), [](const LadderStep& step) {
+    return step.attempt.starts_with("cross-modal");
+  });
   return fail(ErrorKind::quality, fmt::format("poses.{}", name(modality)), found,
               modality == Modality::visible
                   ? "take sharp views every 10-15 deg with textured surroundings in sight, or "
                     "import known poses"
+              : beside_visible
+                  ? "record more thermal stations, with things in sight that stand on one side of "
+                    "the object only, or import known poses"
                   : "record visible views of the same object too, or import known poses");
 }
 

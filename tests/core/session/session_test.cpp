@@ -263,11 +263,12 @@ TEST_F(SessionTest, WrongTypesNameTheField) {
 }
 
 TEST_F(SessionTest, CountsThatWouldWrapAreRefused) {
-  for (const auto& [from, field] : {std::pair{R"("first_sequence":3)", "first_sequence"},
-                                    {R"("count":9)", "count"},
-                                    {R"("last_sequence":20)", "last_sequence"},
-                                    {R"("received":11)", "received"},
-                                    {R"("lost":9)", "lost"}}) {
+  for (const auto& [from, field] :
+       {std::pair{R"("first_sequence":9007199254740983)", "first_sequence"},
+        {R"("count":9)", "count"},
+        {R"("last_sequence":9007199254740992)", "last_sequence"},
+        {R"("received":1)", "received"},
+        {R"("lost":9)", "lost"}}) {
     std::string text = manifest();
     const std::size_t at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;

@@ -273,10 +273,14 @@ TEST_F(WatchTest, APhotoAmongThermalImagesIsPassedOver) {
   options.modality = Modality::thermal;
   WatchSource source(options);
   ASSERT_TRUE(source.start());
+  cv::Mat counts(30, 40, CV_16UC1);
+  cv::RNG(5).fill(counts, cv::RNG::UNIFORM, 29300, 29700);
+  put("IMG_0.tiff", made::tiff_of_pages({counts}, R"({"scale":0.01})"));
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
   put("IMG_1.jpg", photo(1));
   const Delivery delivery = soon(source);
   EXPECT_EQ(delivery.reason, "ignored") << delivery.reason;
-  EXPECT_THAT(delivery.detail, HasSubstr("IMG_1.jpg: a photo"));
+  EXPECT_THAT(delivery.detail, HasSubstr("IMG_1.jpg: 8-bit without temperatures"));
   put("IMG_2.jpg", photo(2).substr(0, 400));
   EXPECT_EQ(soon(source).kind, Delivery::Kind::rejected) << "cut off: nobody knows what it was";
 }

@@ -39,6 +39,17 @@ TEST(NoneHeld, OfOneAttemptTheReasonIsTheMessage) {
   EXPECT_FALSE(std::filesystem::exists(temp.path() / attempts_file));
 }
 
+TEST(NoneHeld, WhoeverRecordedVisibleViewsIsNotToldToRecordThem) {
+  const test::TempFolder temp;
+  const auto remedy = [&](const char* attempt) {
+    return none_held({step(attempt, 0, "two starts")}, Modality::thermal, temp.path())
+        .value()
+        .remedy;
+  };
+  EXPECT_NE(remedy("COLMAP").find("record visible views"), std::string::npos);
+  EXPECT_EQ(remedy("cross-modal, orbit prior").find("record visible views"), std::string::npos);
+}
+
 TEST(NoneHeld, AFolderThatTakesNoFileLeavesTheListInTheMessage) {
   const Error error = none_held({step("one", 0, "no model"), step("two", 2, "2/6 views")},
                                 Modality::visible, "/dev/null/none")
