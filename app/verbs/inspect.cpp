@@ -233,7 +233,7 @@ Status verdict_of(const Session& session, const std::vector<Error>& damaged) {
                 "them");
   if (session.lost_lines > 0)
     return fail(ErrorKind::input, where,
-                fmt::format("{} frames are in no line of the manifest", session.lost_lines),
+                fmt::format("{} of its frames are in no line of the manifest", session.lost_lines),
                 "restore the manifest from a backup; a run goes on without them");
   return {};
 }

@@ -5,6 +5,7 @@
 
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <thread>
 #include <variant>
 
@@ -89,6 +90,12 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
+  void reject(std::uint64_t id, const std::string& why) {
+    account.lose(id, Loss::rejected, rejected_because + why);
+    const std::lock_guard lock(mutex);
+    watch.reject(why);
+  }
+
   void push(Frame frame) {
     std::unique_lock lock(mutex);
     const auto has_room = [&] {
@@ -118,7 +125,7 @@ struct Recorder::Channel {
         } else if (delivery.kind == Delivery::Kind::frame) {
           push(std::move(delivery.frame));
         } else {
-          account.lose(id, Loss::rejected, rejected_because + delivery.reason);
+          reject(id, delivery.reason);
         }
         break;
       }
@@ -236,7 +243,8 @@ struct Recorder::Channel {
     tell_what_is_known();
     const Result<StoredFrame> stored = writer.store(device.id, frame);
     if (!stored && stored.error().kind == ErrorKind::input) {
-      account.lose(frame.id, Loss::rejected, rejected_because + stored.error().found);
+      const std::string file = std::filesystem::path(frame.source).filename().string();
+      reject(frame.id, (file.empty() ? "" : file + ": ") + stored.error().found);
       return;
     }
     if (!stored) return give_up(frame, stored.error());

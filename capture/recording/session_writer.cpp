@@ -11,6 +11,7 @@
 #include <chrono>
 #include <cstring>
 #include <random>
+#include <thread>
 
 #include "capture/image_quality/frame_quality.hpp"
 #include "capture/recording/frame_encoding.hpp"
@@ -53,7 +54,13 @@ Result<int> open_manifest(const fs::path& folder, int extra_flags) {
     return fail(ErrorKind::input, folder.string(), "holds a session already",
                 "choose another folder");
   if (fd < 0) return manifest_failure(folder, errno);
-  if (::flock(fd, LOCK_EX | LOCK_NB) == 0) return fd;
+  // Who only asks whether a session is being recorded holds it for a moment.
+  int taken = ::flock(fd, LOCK_EX | LOCK_NB);
+  for (int i = 0; i < 10 && taken != 0 && errno == EWOULDBLOCK; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    taken = ::flock(fd, LOCK_EX | LOCK_NB);
+  }
+  if (taken == 0) return fd;
   const int error = errno;
   ::close(fd);
   if (error == EWOULDBLOCK)

@@ -39,7 +39,6 @@ void StreamWatch::see(const Delivery& delivery, std::chrono::milliseconds silenc
 }
 
 void StreamWatch::note(const Delivery& delivery) {
-  if (delivery.kind == Delivery::Kind::rejected) rejected_last_ = delivery.reason;
   if (delivery.kind != Delivery::Kind::event) return;
   if (asks_for_operator(delivery.event)) notice_ = delivery.detail;
   if (loses_stream(delivery.event)) outage_ = Outage{last_frame_, delivery.detail};

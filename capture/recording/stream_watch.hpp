@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "capture/frame_source.hpp"
@@ -23,6 +24,8 @@ class StreamWatch {
   void see(const Delivery& delivery, std::chrono::milliseconds silence, bool source_waits);
   /// Of what came after the stream had ended: no silence any more.
   void note(const Delivery& delivery);
+  /// Of a frame that came damaged and is counted so.
+  void reject(std::string why) { rejected_last_ = std::move(why); }
   /// Nobody listens to the source from now on.
   void end() { over_at_ = Clock::now(); }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/system/file_io.hpp"
+#include "core/system/utc_now.hpp"
 #include "core/temperature.hpp"
 #include "drivers/stills/folder_watch.hpp"
 #include "drivers/stills/image_list.hpp"
@@ -84,6 +85,7 @@ bool WatchSource::resume(const Earlier& earlier) {
     seen_files_.insert({frame.source, frame.host_time_ns});  // thermal images are stored decoded
   }
   for (const GapRecord& gap : earlier.gaps) rejected_before_.insert(gap.reason);
+  resumed_at_ns_ = utc_now_ns();
   return false;
 }
 
@@ -95,7 +97,10 @@ Delivery WatchSource::rejection(const std::string& name, const std::string& why)
   Delivery delivery;
   delivery.kind = Delivery::Kind::rejected;
   delivery.reason = name + ": " + why;
-  if (rejected_before_.contains(rejected_because + delivery.reason))
+  // One that came since is another file, whatever its name: cards count from 1 again.
+  const auto written = written_ns(options_.folder / name);
+  if (written && *written < resumed_at_ns_ &&
+      rejected_before_.contains(rejected_because + delivery.reason))
     return event_delivery(EventKind::ignored, delivery.reason + ", as before");
   delivery.frame.id = next_id_++;
   return delivery;
@@ -200,6 +205,7 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   }
   const Result<std::string> bytes = read_file(attempt.file, max_image_bytes);
   if (!bytes || !seen_hashes_.insert(content_hash(*bytes)).second) {
+    know_camera(*still);
     return event_delivery(EventKind::duplicate, name + ": the same image came before");
   }
   delivery.frame = std::move(still->frame);
@@ -210,6 +216,7 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   delivery.frame.source =
       (attempt.file.parent_path().filename() / attempt.file.filename()).string();
   if (seen_files_.contains({delivery.frame.source, delivery.frame.host_time_ns})) {
+    know_camera(*still);
     return event_delivery(EventKind::duplicate, name + ": in the session already");
   }
   {
@@ -232,6 +239,12 @@ std::optional<Delivery> WatchSource::take(Attempt attempt) {
   delivery.frame.flag(FrameFlag::still);
   tell(*still, name, delivery.frame);
   return delivery;
+}
+
+/// From a frame of the session: all of its camera's are of one lens and size.
+void WatchSource::know_camera(const StillPhoto& still) {
+  const std::lock_guard lock(mutex_);
+  if (camera_key_.empty()) camera_key_ = still.key();
 }
 
 void WatchSource::tell(const StillPhoto& still, const std::string& name, Frame& frame) {

@@ -66,6 +66,7 @@ class WatchSource final : public FrameSource {
   /// Or an event "ignored", where an earlier recording rejected it for the same.
   Delivery rejection(const std::string& name, const std::string& why);
   std::optional<Delivery> take(Attempt attempt);
+  void know_camera(const StillPhoto& still);
   /// Flags the frame of a file, and tells what of the file is not as it looks.
   void tell(const StillPhoto& still, const std::string& name, Frame& frame);
   /// Of the first file of a matter; a folder of one program's files has it in each.
@@ -81,7 +82,8 @@ class WatchSource final : public FrameSource {
   std::set<std::pair<std::string, std::optional<std::int64_t>>>
       seen_files_;                         ///< of an earlier recording: name, time
   std::set<std::string> rejected_before_;  ///< GapRecord::reason
-  bool resumed_ = false;                   ///< info_ is the session's word
+  std::int64_t resumed_at_ns_ = 0;
+  bool resumed_ = false;  ///< info_ is the session's word
   std::uint64_t next_id_ = 0;
   bool gone_told_ = false;
   std::set<std::string> told_;    ///< matters

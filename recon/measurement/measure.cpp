@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "core/numeric/percent.hpp"
@@ -403,17 +404,21 @@ Result<Answer> measure(const ThermalScene& scene, const Request& request,
 
 namespace {
 
-bool has_pixel_spots(const Request& request) {
-  if (request.kind == Kind::difference)
-    return std::any_of(request.of.begin(), request.of.end(), has_pixel_spots);
+bool is_pixel_spot(const Request& request) {
   return request.kind == Kind::spot && std::holds_alternative<PixelPlace>(request.places[0]);
 }
 
-/// A line's points may be seen best from another view than the one that it was drawn in.
-bool has_only_spots(const Request& request) {
-  return request.kind == Kind::spot ||
-         (request.kind == Kind::difference &&
-          std::all_of(request.of.begin(), request.of.end(), has_only_spots));
+/// With the spots of what is kept; a line's points may be seen best from another view than the one
+/// that it was drawn in. Nothing where no spot was a pixel.
+std::optional<Request> with_kept_spots(const Request& request, const Request& kept) {
+  if (is_pixel_spot(request)) return kept;
+  std::optional<Request> changed;
+  for (std::size_t i = 0; i < request.of.size(); ++i)
+    if (auto part = with_kept_spots(request.of[i], kept.of[i])) {
+      if (!changed) changed = request;
+      changed->of[i] = *std::move(part);
+    }
+  return changed;
 }
 
 }  // namespace
@@ -422,8 +427,12 @@ Result<Anchored> measure_anchored(const ThermalScene& scene, const Request& requ
                                   const Progress& progress) {
   ORBITFUSE_ASSIGN(Answer answer, measure(scene, request, progress));
   Request kept = anchored(request, answer);
-  if (has_only_spots(request) && has_pixel_spots(request)) {
-    ORBITFUSE_ASSIGN(answer, measure(scene, kept, progress));
+  if (const auto again = with_kept_spots(request, kept)) {
+    Result<Answer> answered = measure(scene, *again, progress);
+    // What a far wall's pixel shows may lie beyond where points are taken for the scene's.
+    if (answered || answered.error().kind == ErrorKind::cancelled) {
+      ORBITFUSE_ASSIGN(answer, std::move(answered));
+    }
   }
   return Anchored{std::move(kept), std::move(answer)};
 }

@@ -84,8 +84,11 @@ bool ModelSelection::matches_contradict(const FeatureLevel& level, JudgedModel& 
   }
   const std::vector<PosedView>& views = judged.poses.reconstruction.views;
   const PosedFrames posed = posed_frames(*graph, judged.poses.reconstruction);
-  const HeldMatches held = held_matches(
-      *graph, posed, mistaken_pairs(*graph, posed, fit_stations(views, session_), views.size()));
+  const Eigen::Vector3d up =
+      canonical_from_world(views, {}).rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  const HeldMatches held =
+      held_matches(*graph, posed,
+                   mistaken_pairs(*graph, posed, fit_stations(views, session_), views.size(), up));
   judged.poses.gates["held_matches"] = held.share;
   judged.poses.gates["contradicted_matches"] = held.contradicted_share;
   judged.why += fmt::format(", {:.0f} % of the matches of pairs hold", 100 * held.share);

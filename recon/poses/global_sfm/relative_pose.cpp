@@ -15,9 +15,9 @@ struct NormalisedMatches {
   std::vector<FeatureMatch> matches;
 };
 
-NormalisedMatches normalised(const FeatureGraph& graph, const ViewPair& pair,
-                             const std::vector<FeatureMatch>& matches) {
-  const Camera &a = graph.cameras[at(pair.first)], &b = graph.cameras[at(pair.second)];
+NormalisedMatches normalised(const FeatureGraph& graph, const std::vector<Camera>& cameras,
+                             const ViewPair& pair, const std::vector<FeatureMatch>& matches) {
+  const Camera &a = cameras[at(pair.first)], &b = cameras[at(pair.second)];
   NormalisedMatches result;
   for (const FeatureMatch& match : matches) {
     const Eigen::Vector2d p = a.normalized_of(graph.pixels[at(pair.first)].col(match.first)),
@@ -86,16 +86,16 @@ std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPa
                                          const RelativePoseOptions& options) {
   const auto proposed = graph.proposed.find(pair);
   if (proposed == graph.proposed.end()) return {};
-  return relative_poses(graph, pair, proposed->second, options);
+  return relative_poses(graph, graph.cameras, pair, proposed->second, options);
 }
 
-std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPair& pair,
+std::vector<RelativePose> relative_poses(const FeatureGraph& graph,
+                                         const std::vector<Camera>& cameras, const ViewPair& pair,
                                          const std::vector<FeatureMatch>& matches,
                                          const RelativePoseOptions& options) {
   std::vector<RelativePose> found;
-  NormalisedMatches given = normalised(graph, pair, matches);
-  const double threshold =
-      options.max_error_px * graph.pixel_scale / graph.cameras[at(pair.first)].fx;
+  NormalisedMatches given = normalised(graph, cameras, pair, matches);
+  const double threshold = options.max_error_px * graph.pixel_scale / cameras[at(pair.first)].fx;
   std::vector<std::uint8_t> used;
   for (int i = 0; i < options.max_hypotheses; ++i) {
     auto pose = strongest(given, pair, threshold, options, used);

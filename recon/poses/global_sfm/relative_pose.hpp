@@ -26,11 +26,12 @@ struct RelativePoseOptions {
   double min_parallax_deg = 1.0;
 };
 
-/// Answers for a pair's matches, the one with most matches first.
-std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPair& pair,
+/// Answers for a pair's matches, the one with most matches first. `cameras`: the frames' lenses.
+std::vector<RelativePose> relative_poses(const FeatureGraph& graph,
+                                         const std::vector<Camera>& cameras, const ViewPair& pair,
                                          const std::vector<FeatureMatch>& matches,
                                          const RelativePoseOptions& options);
-/// For its proposed matches.
+/// For its proposed matches, through the lenses as known before.
 std::vector<RelativePose> relative_poses(const FeatureGraph& graph, const ViewPair& pair,
                                          const RelativePoseOptions& options);
 

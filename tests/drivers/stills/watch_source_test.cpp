@@ -265,8 +265,31 @@ TEST_F(WatchTest, WhatWasRejectedIsNotCountedAgain) {
   const Delivery again = soon(source);
   EXPECT_EQ(again.reason, "ignored");
   EXPECT_THAT(again.detail, HasSubstr("as before"));
+  put("IMG_1.jpg", cut);  // since then, from a card that counts from 1 again
+  fs::last_write_time(folder / "IMG_1.jpg", fs::file_time_type::clock::now() + 2s);
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::rejected);
   put("IMG_1.jpg", photo(1));  // copied anew, whole
   EXPECT_EQ(soon(source).kind, Delivery::Kind::frame);
+}
+
+TEST_F(WatchTest, AnotherSizeStaysRejectedInAResumedSession) {
+  put("IMG_1.jpg", photo(1));
+  put("IMG_2.jpg", photo(2, 60, 45));
+  options.existing = true;
+  std::vector<FrameRecord> recorded(1);
+  {
+    WatchSource source(options);
+    ASSERT_TRUE(source.start());
+    const Delivery first = soon(source);
+    ASSERT_EQ(first.kind, Delivery::Kind::frame);
+    recorded[0].content_hash = content_hash(first.frame.encoded);
+    EXPECT_EQ(soon(source).kind, Delivery::Kind::rejected);
+  }
+  WatchSource source(options);
+  ASSERT_TRUE(source.start());
+  source.resume({source.describe(), recorded, {}, 2});
+  EXPECT_EQ(soon(source).reason, "duplicate");
+  EXPECT_EQ(soon(source).kind, Delivery::Kind::rejected) << "not the first of another camera";
 }
 
 TEST_F(WatchTest, APhotoAmongThermalImagesIsPassedOver) {

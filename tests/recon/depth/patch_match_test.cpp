@@ -16,7 +16,6 @@ class PatchMatch : public testing::Test {
  protected:
   PatchMatch() {
     test::World world = test::arc(5, 15, 1, 96);
-    std::vector<DepthView> views;
     for (std::size_t i = 0; i < world.images.size(); ++i) {
       world.images[i].colRange(0, world.images[i].cols / 3).setTo(100);
       const PosedView& posed = world.model.views[i];
@@ -30,6 +29,7 @@ class PatchMatch : public testing::Test {
     improve(found, view, sources, range, iterations, {}, 3);
   }
 
+  std::vector<DepthView> views;  ///< the sources point to their pixels
   DepthView view;
   std::vector<SourceView> sources;
   PlaneMap start, found;

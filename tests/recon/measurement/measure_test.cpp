@@ -589,6 +589,15 @@ TEST(Measure, WhatIsKeptOfASpotIsWhatItAnswersAgain) {
   const auto both = measure_anchored(scene, difference, {});
   ASSERT_TRUE(both) << both.error().message();
   EXPECT_EQ(to_json(both->answer), to_json(ask(scene, both->request)));
+  EXPECT_EQ(to_json(both->answer.of[1]), to_json(kept->answer));
+  difference.of[0].kind = Kind::box;
+  difference.of[0].places.clear();
+  difference.of[0].box.center = {0.4, 0, 0};
+  difference.of[0].box.size = {0.02, 0.2, 0.2};
+  const auto mixed = measure_anchored(scene, difference, {});
+  ASSERT_TRUE(mixed) << mixed.error().message();
+  EXPECT_EQ(to_json(mixed->answer.of[1]), to_json(kept->answer));
+  EXPECT_EQ(to_json(mixed->answer), to_json(ask(scene, mixed->request)));
 }
 
 TEST(Measure, ParametersThatNothingCanHaveAreBlamed) {

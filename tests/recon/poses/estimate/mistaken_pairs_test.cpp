@@ -61,7 +61,7 @@ TEST(MistakenPairs, EqualSidesAreNoWitnessesWhereStationsConfirmTheModel) {
   const HeldMatches alone = held_matches(scene.graph, right);
   ASSERT_GT(alone.contradicted + alone.outvoted, 2);
   const auto question = [&](const std::optional<StationFit>& fit) {
-    return mistaken_pairs(scene.graph, right, fit, scene.truth.size());
+    return mistaken_pairs(scene.graph, right, fit, scene.truth.size(), Eigen::Vector3d::UnitZ());
   };
   const auto all = static_cast<int>(scene.truth.size());
   const PairQuestion mistaken = question(stations_within(8, all));
@@ -92,11 +92,30 @@ TEST(MistakenPairs, TrueMatchesOfAModelThatIsOffByLessThanStationsTellStayWitnes
   }
   const PairQuestion mistaken =
       mistaken_pairs(scene.graph, off, stations_within(12, static_cast<int>(scene.truth.size())),
-                     scene.truth.size());
+                     scene.truth.size(), Eigen::Vector3d::UnitZ());
   ASSERT_TRUE(mistaken);
   const HeldMatches held = held_matches(scene.graph, off, mistaken);
   EXPECT_EQ(held.mistaken, 0);
   EXPECT_TRUE(held.contradict());
+}
+
+/// Nothing holds elevations against the stations, so that a model which lays a loop upon another
+/// agrees with them.
+TEST(MistakenPairs, TurnsThatChangeElevationsAreNoneOfTheStations) {
+  const FeatureScene scene = described_scene();
+  PosedFrames tilted = true_poses(scene);
+  const auto all = static_cast<int>(scene.truth.size());
+  for (std::size_t f = 1; f < tilted.poses.size(); f += 2) {
+    const Eigen::Vector3d center = camera_center(*tilted.poses[f]);
+    const Eigen::Vector3d across = center.cross(Eigen::Vector3d::UnitZ()).normalized();
+    const Eigen::Quaterniond rotation(Eigen::AngleAxisd(1.0, across));
+    tilted.poses[f] = *tilted.poses[f] * Rigid3d{rotation, Eigen::Vector3d::Zero()};
+  }
+  const PairQuestion mistaken = mistaken_pairs(scene.graph, tilted, stations_within(5, all),
+                                               scene.truth.size(), Eigen::Vector3d::UnitZ());
+  const HeldMatches held = held_matches(scene.graph, tilted, mistaken);
+  EXPECT_TRUE(held.contradict());
+  EXPECT_GT(held.contradicted, held.mistaken);
 }
 
 }  // namespace
