@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 
 #include "core/geometry/scene_ball.hpp"
 #include "core/system/parallel.hpp"
@@ -34,6 +35,24 @@ double orbit_radius(const Reconstruction& model) {
   return rms_radius(centers);
 }
 
+/// nullopt where nothing speaks against where the view stands.
+std::optional<std::string> why_not_here(const OtherPlace& place, double shift,
+                                        const PlacedElsewhereOptions& options) {
+  const int there = place.agree_there, here = place.agree_here;
+  if (shift < options.least_shift) return std::nullopt;
+  if (there - here > options.more_sigmas * std::sqrt(std::max(here, 1)))
+    return fmt::format(
+        "the other views' points place it {:.1f} % of the orbit's radius aside, where {} of its "
+        "matches agree, here {}",
+        100 * shift, there, here);
+  if (shift >= options.open_shift && there >= here)
+    return fmt::format(
+        "the other views' points leave its place open: {:.1f} % of the orbit's radius aside {} of "
+        "its matches agree, here {}",
+        100 * shift, there, here);
+  return std::nullopt;
+}
+
 }  // namespace
 
 Result<std::vector<DoubtfulView>> placed_elsewhere(const FeatureGraph& graph,
@@ -60,17 +79,12 @@ Result<std::vector<DoubtfulView>> placed_elsewhere(const FeatureGraph& graph,
   ORBITFUSE_TRY(progress.check("poses.visible"));
   for (std::size_t i = 0; i < asked.size(); ++i) {
     if (!places[i]) continue;
-    const auto& [pose, there, here] = *places[i];
     const double shift =
-        (camera_center(pose) - camera_center(*posed.poses[at(asked[i])])).norm() / radius;
-    if (shift < options.least_shift ||
-        there - here <= options.more_sigmas * std::sqrt(std::max(here, 1)))
-      continue;
-    views.push_back({graph.frames[at(asked[i])]->file, DoubtReason::neighbours_elsewhere,
-                     fmt::format("the other views' points place it {:.1f} % of the orbit's radius "
-                                 "aside, where {} of its matches agree, here {}; take one between "
-                                 "it and the next",
-                                 100 * shift, there, here)});
+        (camera_center(places[i]->pose) - camera_center(*posed.poses[at(asked[i])])).norm() /
+        radius;
+    if (auto why = why_not_here(*places[i], shift, options))
+      views.push_back({graph.frames[at(asked[i])]->file, DoubtReason::neighbours_elsewhere,
+                       *why + "; take one between it and the next"});
   }
   return views;
 }

@@ -16,13 +16,17 @@ struct PlacedElsewhereOptions {
   double least_shift = 0.01;
   /// By how many standard deviations of a count more of its matches must agree there than here.
   double more_sigmas = 3;
+  /// Of the orbit's radius: where as many agree this far aside as here, they hold it in neither
+  /// place. Right views lie up to 0.026 aside by noise, a wrong one 0.063 (`five_drums`).
+  double open_shift = 0.04;
 };
 
 /// Views that the other views' points place elsewhere. What was found along a view's own epipolar
 /// lines agrees with it wherever it stands, so its residuals are small in a wrong place too; its
-/// exact matches with points that the others alone hold are not of its making. Asked are the views
-/// that hold few of their verified matches, which right ones do too (docs/notes/poses_visible.md).
-/// A view of whose matches fewer than twenty show such points is not named. Errors: cancelled.
+/// exact matches with points that the others alone hold are not of its making. Views that these
+/// leave between two places are named as well. Asked are the views that hold few of their verified
+/// matches, which right ones do too (docs/notes/poses_visible.md). A view of whose matches fewer
+/// than twenty show such points is not named. Errors: cancelled.
 Result<std::vector<DoubtfulView>> placed_elsewhere(const FeatureGraph& graph,
                                                    const Reconstruction& model,
                                                    const Progress& progress,

@@ -55,6 +55,41 @@ TEST(PlacedElsewhere, RightViewsAreNotNamedHoweverFewMatchesTheyHold) {
   EXPECT_TRUE(named->empty()) << named->front().why;
 }
 
+/// Half of what view 5 matches where it would be from another place: its matches leave open
+/// which of the two it is.
+FeatureScene with_a_view_of_two_places(double turn_rad) {
+  FeatureScene scene = testing_orbit::described_scene();
+  const Reconstruction truth = with_a_view_aside(scene, 0);
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()));
+  const PosedView& here = scene.truth[5];
+  const Rigid3d there = here.cam_from_world * Rigid3d{turn, Eigen::Vector3d::Zero()};
+  for (const SparsePoint& point : truth.points)
+    for (const Observation& o : point.track) {
+      if (o.view != 5) continue;
+      Eigen::Index feature = 0;
+      Eigen::Matrix2Xd& pixels = scene.graph.pixels[5];
+      (pixels.colwise() - o.pixel).colwise().squaredNorm().minCoeff(&feature);
+      if (feature % 3 != 0)
+        pixels.col(feature) += here.camera.project(there * point.position) -
+                               here.camera.project(here.cam_from_world * point.position);
+    }
+  return scene;
+}
+
+TEST(PlacedElsewhere, AViewThatItsMatchesLeaveBetweenTwoPlacesIsNamed) {
+  const FeatureScene scene = with_a_view_of_two_places(0.06);
+  // Whichever place more agree with, as a model's own lines would hold it in the other.
+  std::vector<DoubtfulView> named;
+  for (const double turn : {0.0, 0.06}) {
+    const auto found = placed_elsewhere(scene.graph, with_a_view_aside(scene, turn), {});
+    ASSERT_TRUE(found);
+    named.insert(named.end(), found->begin(), found->end());
+  }
+  ASSERT_EQ(named.size(), 1u);
+  EXPECT_EQ(named.front().name, scene.truth[5].name);
+  EXPECT_THAT(named.front().why, HasSubstr("leave its place open"));
+}
+
 TEST(PlacedElsewhere, StopsWhenAsked) {
   const FeatureScene scene = testing_orbit::described_scene();
   const std::atomic<bool> stop = true;
