@@ -62,6 +62,7 @@ struct Recorder::Channel {
   std::size_t frames_queued = 0;
   bool capture_over = false;
   bool writer_failed = false;
+  std::deque<GapRecord> untold_gaps;             ///< taken from the account, in no line yet
   std::optional<std::uint64_t> first_unwritten;  ///< the frame at which the writer failed
   StreamWatch watch;
   std::optional<Error> error;
@@ -266,10 +267,12 @@ struct Recorder::Channel {
     changed.notify_all();
   }
 
-  void write_gaps(std::optional<std::uint64_t> frame_id) {
-    for (const GapRecord& gap : account.take_gaps(frame_id)) {
-      if (const Status s = writer.append(gap); !s) keep_first(s.error());
-    }
+  /// What a full disk refuses is written once it takes a line again.
+  Status write_gaps(std::optional<std::uint64_t> frame_id) {
+    for (GapRecord& gap : account.take_gaps(frame_id)) untold_gaps.push_back(std::move(gap));
+    for (; !untold_gaps.empty(); untold_gaps.pop_front())
+      ORBITFUSE_TRY(writer.append(untold_gaps.front()));
+    return {};
   }
 
   /// A source that waits has the frames that were not written still, and delivers them again.
@@ -289,14 +292,15 @@ struct Recorder::Channel {
         if (const Status s = writer.append(std::get<EventRecord>(*item)); !s) keep_first(s.error());
       } else if (writer_failed) {
         account.lose(frame->id, Loss::unwritten, "not written");
+      } else if (const Status told = write_gaps(frame->id); !told) {
+        give_up(*frame,
+                told.error());  // wherever the manifest ends, it accounts for ids up to there
       } else {
-        write_gaps(
-            frame->id);  // first: wherever the manifest ends, it accounts for every id up to there
         store(*frame);
       }
     }
     if (first_unwritten && source_waits()) leave_for_resuming();
-    write_gaps(std::nullopt);
+    if (const Status told = write_gaps(std::nullopt); !told) keep_first(told.error());
     if (!account.counts().any) return;
     if (const Status s = writer.append(account.record()); !s) keep_first(s.error());
   }

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <optional>
 
 #include "core/image/image_io.hpp"
 #include "core/system/file_io.hpp"
 #include "tests/capture/scripted_source.hpp"
 #include "tests/core/session/session_account.hpp"
+#include "tests/support/file_size_limit.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse {
@@ -211,6 +213,37 @@ TEST(Recorder, FramesThatCannotBeWrittenAreLostOnlyToACamera) {
     EXPECT_EQ(s.unwritten, waits ? 0u : 3u);
     EXPECT_EQ(session.events.size(), waits ? 1u : 0u);
   }
+}
+
+/// The disk is full when 3 and 4 are to be told, and has room again at the end.
+TEST(Recorder, AGapThatAFullDiskRefusesIsToldAtTheEnd) {
+  Recording r;
+  std::deque<Delivery> script;
+  for (std::uint64_t id : {1, 2, 5, 6}) script.push_back(frame_delivery(id, thermal_pixels()));
+  ScriptedSource source("thermal0", Modality::thermal, script);
+  Recorder recorder(*r.writer, {});
+  std::optional<test::FileSizeLimit> full;
+  std::atomic<bool> filled = false;
+  recorder.on_frame = [&](const StoredFrame& f) {
+    if (f.record.sequence != 2) return;
+    full.emplace(std::filesystem::file_size(r.folder / "s" / "manifest.jsonl") + 20);
+    filled = true;
+  };
+  int asked = 0;
+  source.before_next = [&] {
+    const auto wait_for = [](const auto& met) {
+      while (!met()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    };
+    if (++asked == 3) wait_for([&] { return filled.load(); });
+    if (asked != 4) return;
+    wait_for([&] { return recorder.status()[0].unwritten > 0; });
+    full.reset();
+  };
+  EXPECT_FALSE(recorder.run({&source}));
+  const Session session = r.open();
+  expect_exact_accounts(session);
+  EXPECT_EQ(session.frames.size(), 2u);
+  EXPECT_EQ(session.gaps.size(), 2u);
 }
 
 TEST(Recorder, WhatAResumedStreamSkipsAtItsBeginningIsMissing) {
