@@ -50,6 +50,7 @@ class Gathering {
                   "a thermal image, and so are all of the photos",
                   "give it with --thermal (--embedded-visible takes the photos inside), and photos "
                   "with --visible");
+    share_one_folder();
     ORBITFUSE_TRY(check_roles());
     take_out_copies(Modality::visible, {&inputs_.visible, &inputs_.visible_tracking});
     take_out_copies(Modality::thermal, {&inputs_.thermal, &inputs_.thermal_tracking});
@@ -206,6 +207,7 @@ class Gathering {
         if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
           decoder_.observe(*thermal, source.short_name());
           source.taken_ns = thermal->taken_ns;
+          source.more_than_8_bits = thermal->kind != ThermalFile::Kind::gray8;
         }
         sources.push_back(source);
       }
@@ -230,6 +232,28 @@ class Gathering {
     for (std::vector<Source>* sources : lists) {
       filter.take_out(*sources, remarks_);
     }
+  }
+
+  /// A folder that holds both orbits may be given as either: its files say which they are of.
+  void share_one_folder() {
+    std::vector<Source>&photos = inputs_.visible, &thermal = inputs_.thermal;
+    std::set<std::string> shown, measured;  // by content
+    for (const Source& photo : photos) shown.insert(photo.hash);
+    for (const Source& source : thermal)
+      if (source.more_than_8_bits) measured.insert(source.hash);
+    const auto is_shown = [&](const Source& source) { return shown.contains(source.hash); };
+    const auto is_measured = [&](const Source& source) { return measured.contains(source.hash); };
+    const auto measures = std::count_if(thermal.begin(), thermal.end(), is_measured);
+    const auto count = static_cast<std::ptrdiff_t>(thermal.size());
+    if (measures == 0 || measures == count ||
+        !std::all_of(thermal.begin(), thermal.end(), is_shown))
+      return;
+    std::erase_if(thermal, [&](const Source& source) { return !is_measured(source); });
+    std::erase_if(photos, is_measured);
+    remarks_.add(fmt::format(
+        "one folder given as both: its {} images of more than 8 bits are taken as thermal, the "
+        "other {} as photos",
+        measures, photos.size()));
   }
 
   /// One folder given twice is no pair of orbits.

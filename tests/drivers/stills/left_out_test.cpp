@@ -193,6 +193,20 @@ TEST_F(LeftOut, ImagesOfOneNameAreToldApartByTheirFoldersOrNotAtAll) {
   EXPECT_THAT(report->warnings, test::one_says("has the name of another image"));
 }
 
+TEST_F(LeftOut, OneFolderThatHoldsBothOrbitsIsSharedOut) {
+  for (int i = 0; i < 4; ++i) {
+    put_photo(fmt::format("in/{}.jpg", i), static_cast<std::uint64_t>(i));
+    put_counts(fmt::format("in/{}.tif", i), 29300, 29700, static_cast<std::uint64_t>(i));
+  }
+  options.visible = options.thermal = {folder / "in"};
+  const auto report = import();
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->visible, 4);
+  EXPECT_EQ(report->thermal, 4);
+  EXPECT_THAT(report->warnings, test::one_says("one folder given as both: its 4 images"));
+  EXPECT_THAT(report->warnings, test::none_says("left out"));
+}
+
 TEST_F(LeftOut, ALinkToASiblingIsOneImage) {
   put_photo("in/b.jpg", 1);
   fs::create_symlink("b.jpg", folder / "in/a_latest.jpg");
