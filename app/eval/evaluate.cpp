@@ -114,8 +114,23 @@ Status add_poses(Run& run, const Session& session, const GroundTruth& truth, Mod
   }
   const PoseError error = pose_error(pairs, *fit);
   run.result[stage] = to_json(error, views->second.size());
-  if (const auto doubt = doubt_of_truth(pairs, error)) run.warn(stage + ": " + *doubt);
-  (modality == Modality::visible ? run.truth_from_visible : run.truth_from_thermal) = *fit;
+  auto& truth_from_estimated =
+      modality == Modality::visible ? run.truth_from_visible : run.truth_from_thermal;
+  truth_from_estimated = *fit;
+  // What the run doubts itself must not decide where its fields lie.
+  ORBITFUSE_ASSIGN(const auto doubts, stages::load_doubts(run.out / stage));
+  Reconstruction sure = model;
+  std::erase_if(sure.views, [&](const PosedView& view) { return doubts.contains(view.name); });
+  const std::vector<PosePair> sure_pairs = match(session, sure, known);
+  const auto sure_fit = truth_from_estimate(sure_pairs);
+  const bool told_apart = sure_fit && 2 * sure_pairs.size() >= pairs.size();
+  const PoseError sure_error = told_apart ? pose_error(sure_pairs, *sure_fit) : error;
+  if (told_apart && sure_pairs.size() < pairs.size()) {
+    run.result[stage]["sure"] = to_json(sure_error, views->second.size());
+    truth_from_estimated = *sure_fit;
+  }
+  if (const auto doubt = doubt_of_truth(told_apart ? sure_pairs : pairs, sure_error))
+    run.warn(stage + ": " + *doubt);
   return {};
 }
 

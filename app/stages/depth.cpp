@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "app/stages/artifacts.hpp"
+#include "app/stages/learned_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/geometry/seen_by_some.hpp"
 #include "core/image/image_io.hpp"
@@ -13,8 +14,9 @@ namespace {
 using pipeline::StageContext;
 using pipeline::StageOutput;
 
-/// The views that train, and where they stand among all: held-out views are not matched, so that
-/// the geometry they measure comes from the others (their poses and points come from all).
+/// The views that train, and where they stand among those that are learned from: held-out views are
+/// not matched, so that the geometry they measure comes from the others (their poses and points
+/// come from all).
 struct TrainingViews {
   Reconstruction model;
   std::vector<int> index;
@@ -22,25 +24,22 @@ struct TrainingViews {
 
 TrainingViews training_views(const Reconstruction& all, int holdout_every) {
   TrainingViews out;
-  std::vector<int> place(all.views.size(), -1);
+  std::vector<char> trained(all.views.size(), 1);
   for (std::size_t i = 0; i < all.views.size(); ++i) {
-    if (holdout_every > 0 && i % static_cast<std::size_t>(holdout_every) == 0) continue;
-    place[i] = static_cast<int>(out.index.size());
-    out.index.push_back(static_cast<int>(i));
-    out.model.views.push_back(all.views[i]);
+    if (holdout_every > 0 && i % static_cast<std::size_t>(holdout_every) == 0)
+      trained[i] = 0;
+    else
+      out.index.push_back(static_cast<int>(i));
   }
-  for (const SparsePoint& point : all.points) {
-    SparsePoint kept = seen_by_some(point, place);
-    if (kept.track.size() > 1) out.model.points.push_back(std::move(kept));
-  }
+  out.model = part_of(all, trained);
   return out;
 }
 
 Result<StageOutput> estimate(const StageContext& context, const SessionInput& input,
                              const RunConfig& config) {
-  ORBITFUSE_ASSIGN(const Reconstruction all,
-                   load_poses(context.of("poses_visible"), Modality::visible));
-  const TrainingViews views = training_views(all, config.train_visible.options.holdout_every);
+  ORBITFUSE_ASSIGN(const LearnedViews learned, learned_views(context, Modality::visible));
+  const TrainingViews views =
+      training_views(learned.model, config.train_visible.options.holdout_every);
   std::vector<cv::Mat> images(views.model.views.size());
   std::vector<Status> problems(images.size());
   parallel_for(static_cast<int>(images.size()), [&](int i) {
@@ -86,7 +85,7 @@ Result<StageOutput> estimate(const StageContext& context, const SessionInput& in
 pipeline::Stage depth_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "depth";
-  stage.version = 5;  // ground under cameras on their side
+  stage.version = 6;  // without photos in doubt
   stage.needs = {"poses_visible"};
   stage.options = in.config->settings().to_json("depth");
   stage.options["holdout_every"] = in.config->train_visible.options.holdout_every;

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "app/stages/artifacts.hpp"
+#include "app/stages/learned_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/palette.hpp"
@@ -112,8 +113,8 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
   VisibleScene scene;
   const bool visible = context.has("poses_visible");
   if (visible) {
-    ORBITFUSE_ASSIGN(scene.reconstruction,
-                     load_poses(context.of("poses_visible"), Modality::visible));
+    ORBITFUSE_ASSIGN(LearnedViews learned, learned_views(context, Modality::visible));
+    scene.reconstruction = std::move(learned.model);
   }
   nerf::Field field;
   if (context.has("train_visible")) {
@@ -134,9 +135,9 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 21;  // views aside of another even spacing than the declared one
+  stage.version = 22;  // views that their matches leave between two places
   if (!visible) {
-    stage.version = 29;  // judged anew by another lens; starts beside
+    stage.version = 30;  // without photos in doubt
     stage.uses = {"poses_visible"};
     if (asks_for_renders(in.session->session, in.config->poses))
       stage.uses.push_back("train_visible");

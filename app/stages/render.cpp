@@ -10,6 +10,7 @@
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/given_cameras.hpp"
+#include "app/stages/learned_views.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "app/stages/rendered_views.hpp"
 #include "app/stages/stage_list.hpp"
@@ -118,7 +119,11 @@ Result<UnseenViews> recorded_views_of(const StageContext& context, const Fields&
                                       Modality frame) {
   const TraceSpan span("what recorded views saw");
   const DetailedField& shown = frame == Modality::visible ? fields.visible : fields.thermal;
-  ORBITFUSE_ASSIGN(const Reconstruction posed, load_trained_poses(context, frame));
+  ORBITFUSE_ASSIGN(Reconstruction posed, load_trained_poses(context, frame));
+  ORBITFUSE_ASSIGN(const LearnedViews learned, learned_views(context, frame));
+  std::erase_if(posed.views, [&](const PosedView& view) {
+    return std::count(learned.left_out.begin(), learned.left_out.end(), view.name) > 0;
+  });
   ORBITFUSE_ASSIGN(SeenBefore seen,
                    SeenBefore::of(depth_renderer(shown.field, context.progress), posed.views));
   return UnseenViews(std::move(seen));

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "app/stages/artifacts.hpp"
+#include "app/stages/learned_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "app/stages/train_extension.hpp"
 #include "core/formats/ply.hpp"
@@ -24,24 +26,30 @@ Result<nerf::Field> guide_field(const StageContext& context) {
   return nerf::Field::load(context.of("train_visible") / field_file);
 }
 
-/// Keeps the poses that training ended with, if it moved them.
+void move_to(const std::map<std::string, Rigid3d>& refined, Reconstruction& model) {
+  for (PosedView& view : model.views)
+    if (const auto found = refined.find(view.name); found != refined.end())
+      view.cam_from_world = found->second;
+}
+
+/// Keeps the poses that training ended with, if it moved them: those of all posed views.
 Status take_refined_poses(const nerf::TrainReport& report, const StageContext& context,
                           const Session& session, Reconstruction& model) {
   if (report.refined_poses.empty()) return {};
-  for (PosedView& view : model.views)
-    if (const auto refined = report.refined_poses.find(view.name);
-        refined != report.refined_poses.end())
-      view.cam_from_world = refined->second;
-  Reconstruction moved = model;
-  moved.points.clear();  // they were where the views had been
-  return save_poses(context, session, moved);
+  move_to(report.refined_poses, model);
+  ORBITFUSE_ASSIGN(
+      Reconstruction all,
+      load_poses(context.of("poses_" + std::string(name(model.modality))), model.modality));
+  move_to(report.refined_poses, all);
+  all.points.clear();  // they were where the views had been
+  return save_poses(context, session, all);
 }
 
 Result<StageOutput> train(const StageContext& context, const SessionInput& input,
                           const TrainConfig& config, Modality modality, const json& resolved,
                           nerf::KeptRenders* kept) {
-  const std::string poses = "poses_" + std::string(name(modality));
-  ORBITFUSE_ASSIGN(Reconstruction model, load_poses(context.of(poses), modality));
+  ORBITFUSE_ASSIGN(LearnedViews learned, learned_views(context, modality));
+  Reconstruction& model = learned.model;
   ORBITFUSE_ASSIGN(nerf::Dataset data,
                    training_data(input.session.folder, model, input.samples(model.modality),
                                  config.max_width_px, context.progress));
@@ -50,6 +58,10 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   }
   nerf::TrainOptions options = config.options;
   StageOutput output;
+  if (const std::vector<std::string>& left_out = learned.left_out; !left_out.empty())
+    output.skips.push_back({fmt::format("{} posed photos", left_out.size()),
+                            fmt::format("in doubt: {}", fmt::join(left_out, ", ")),
+                            fmt::format("the field learns from the other {}", model.views.size())});
   nerf::Field guide;
   if (modality == Modality::thermal && options.shared_geometry) {
     ORBITFUSE_ASSIGN(guide, guide_field(context));
@@ -125,7 +137,7 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   pipeline::Stage stage;
   stage.name = "train_" + modality_name;
   // Thermal fields without a guide match their own depth: theirs rises with the depth stage's, too.
-  stage.version = visible ? 6 : 10;
+  stage.version = visible ? 7 : 11;
   stage.needs = {"poses_" + modality_name};
   stage.uses = {visible ? "depth" : "train_visible"};
   stage.options = in.config->settings().to_json("train." + modality_name);

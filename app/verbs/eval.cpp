@@ -28,6 +28,7 @@ void print_poses(terminal::Console& console, const json& result, const char* key
                   label, j["posed"].get<int>(), j["total"].get<int>(),
                   j["ate_percent"].get<double>(), j["ate_max_percent"].get<double>(),
                   j["rotation_mean_deg"].get<double>(), j["rotation_max_deg"].get<double>()));
+  if (j.contains("sure")) print_poses(console, j, "sure", "  without doubtful ones");
 }
 
 void print(terminal::Console& console, const json& result) {
