@@ -242,8 +242,10 @@ constexpr const char* registration_file = "registration.json";
 
 }  // namespace
 
-Status save_pose_frame(const fs::path& folder, PoseFrame frame) {
-  return write_json(folder / pose_frame_file, {{"shared_frame", frame == PoseFrame::visible}});
+Status save_pose_frame(const fs::path& folder, PoseFrame frame,
+                       const std::vector<std::string>& doubtful) {
+  return write_json(folder / pose_frame_file,
+                    {{"shared_frame", frame == PoseFrame::visible}, {"doubtful", doubtful}});
 }
 
 Result<PoseFrame> load_pose_frame(const fs::path& folder) {

@@ -43,9 +43,11 @@ Result<Reconstruction> load_trained_poses(const pipeline::StageContext& context,
 /// Errors: input (its record is cut or of another version).
 Result<std::map<std::string, std::string>> load_doubts(const std::filesystem::path& folder);
 
-/// Which world the poses of a stage live in (poses.json).
+/// Which world the poses of a stage live in (poses.json). The doubtful views' names stand beside
+/// it, so that what later stages make of them is made anew where only these change.
 enum class PoseFrame { own, visible };
-Status save_pose_frame(const std::filesystem::path& folder, PoseFrame frame);
+Status save_pose_frame(const std::filesystem::path& folder, PoseFrame frame,
+                       const std::vector<std::string>& doubtful);
 /// Errors: input (not there, cut, or without the field: the stage has to run again).
 Result<PoseFrame> load_pose_frame(const std::filesystem::path& folder);
 

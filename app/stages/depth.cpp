@@ -14,7 +14,7 @@ namespace {
 using pipeline::StageContext;
 using pipeline::StageOutput;
 
-/// The views that train, and where they stand among those that are learned from: held-out views are
+/// The views that train, and where they stand among all posed ones: held-out views are
 /// not matched, so that the geometry they measure comes from the others (their poses and points
 /// come from all).
 struct TrainingViews {
@@ -22,24 +22,24 @@ struct TrainingViews {
   std::vector<int> index;
 };
 
-TrainingViews training_views(const Reconstruction& all, int holdout_every) {
+TrainingViews training_views(const LearnedViews& learned, int holdout_every) {
   TrainingViews out;
-  std::vector<char> trained(all.views.size(), 1);
-  for (std::size_t i = 0; i < all.views.size(); ++i) {
-    if (holdout_every > 0 && i % static_cast<std::size_t>(holdout_every) == 0)
-      trained[i] = 0;
+  std::vector<char> trained(learned.model.views.size(), 1);
+  for (std::size_t posed = 0; posed < learned.place.size(); ++posed) {
+    if (learned.place[posed] < 0) continue;
+    if (holdout_every > 0 && learned.place[posed] % holdout_every == 0)
+      trained[static_cast<std::size_t>(learned.place[posed])] = 0;
     else
-      out.index.push_back(static_cast<int>(i));
+      out.index.push_back(static_cast<int>(posed));
   }
-  out.model = part_of(all, trained);
+  out.model = part_of(learned.model, trained);
   return out;
 }
 
 Result<StageOutput> estimate(const StageContext& context, const SessionInput& input,
                              const RunConfig& config) {
   ORBITFUSE_ASSIGN(const LearnedViews learned, learned_views(context, Modality::visible));
-  const TrainingViews views =
-      training_views(learned.model, config.train_visible.options.holdout_every);
+  const TrainingViews views = training_views(learned, config.train_visible.options.holdout_every);
   std::vector<cv::Mat> images(views.model.views.size());
   std::vector<Status> problems(images.size());
   parallel_for(static_cast<int>(images.size()), [&](int i) {

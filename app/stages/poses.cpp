@@ -94,7 +94,9 @@ Status save_session_bounds(const StageContext& context, const SessionInput& inpu
 Result<StageOutput> finish(const StageContext& context, const Session& session,
                            const ModalityPoses& poses, PoseFrame frame) {
   ORBITFUSE_TRY(save_poses(context, session, poses.reconstruction));
-  ORBITFUSE_TRY(save_pose_frame(context.folder, frame));
+  std::vector<std::string> doubtful;
+  for (const DoubtfulView& view : poses.doubtful) doubtful.push_back(view.name);
+  ORBITFUSE_TRY(save_pose_frame(context.folder, frame, doubtful));
   std::error_code ignored;
   std::filesystem::remove_all(context.folder / "work", ignored);
   return describe(poses, frame);
@@ -115,6 +117,9 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
   if (visible) {
     ORBITFUSE_ASSIGN(LearnedViews learned, learned_views(context, Modality::visible));
     scene.reconstruction = std::move(learned.model);
+    if (!learned.left_out.empty()) {
+      ORBITFUSE_ASSIGN(scene.posed, load_poses(context.of("poses_visible"), Modality::visible));
+    }
   }
   nerf::Field field;
   if (context.has("train_visible")) {

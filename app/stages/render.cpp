@@ -106,9 +106,8 @@ std::string words_on_detail(const Fields& fields) {
 Result<GivenCameras> choose_views(const StageContext& context, const RenderConfig& config,
                                   Modality frame) {
   if (config.cameras.empty()) {
-    ORBITFUSE_ASSIGN(const Reconstruction posed,
-                     load_poses(context.of("poses_" + std::string(name(frame))), frame));
-    ORBITFUSE_ASSIGN(NewViews views, new_views(posed.views, config.path));
+    ORBITFUSE_ASSIGN(const LearnedViews learned, learned_views(context, frame));
+    ORBITFUSE_ASSIGN(NewViews views, new_views(learned.model.views, config.path));
     return GivenCameras{std::move(views), {}};
   }
   return read_given_cameras(config.cameras);
@@ -140,11 +139,11 @@ cv::Mat masked(const cv::Mat& kelvin, const cv::Mat& opacity, double min_opacity
 /// and what is warm against its surroundings.
 Status choose_scales(const StageContext& context, Modality frame,
                      const std::vector<ThermalView>& seen, RenderedViews& rendered) {
-  ORBITFUSE_ASSIGN(const Reconstruction posed,
-                   load_poses(context.of("poses_" + std::string(name(frame))), frame));
-  const TemperatureSpan object = object_span(seen, posed.views);
+  ORBITFUSE_ASSIGN(const LearnedViews learned, learned_views(context, frame));
+  const std::vector<PosedView>& posed = learned.model.views;
+  const TemperatureSpan object = object_span(seen, posed);
   const HeatScaleOptions how = heat_scale_options(rendered.samples());
-  rendered.heat = heat_scale(within_orbit(seen, posed.views, surroundings_reach), how);
+  rendered.heat = heat_scale(within_orbit(seen, posed, surroundings_reach), how);
   rendered.heat.hot = object.high_k;
   rendered.heat = within_levels(rendered.heat, how);
   rendered.span = rendered.thermal_is_gray ? TemperatureSpan{0, 255} : object;
@@ -280,7 +279,7 @@ Result<StageOutput> render(const StageContext& context, const StageInputs& in) {
 pipeline::Stage render_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "render";
-  stage.version = 9;  // gray thermal frames
+  stage.version = 10;  // without photos in doubt
   stage.uses = {"poses_visible", "poses_thermal", "train_visible", "train_thermal", "register"};
   stage.options = in.config->settings().to_json("render");
   const std::string& cameras = in.config->render.cameras;

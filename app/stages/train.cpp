@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "app/stages/artifacts.hpp"
 #include "app/stages/learned_views.hpp"
 #include "app/stages/stage_list.hpp"
 #include "app/stages/train_extension.hpp"
+#include "core/first_names.hpp"
 #include "core/formats/ply.hpp"
 #include "core/system/side_by_side.hpp"
 #include "recon/assembly/thermal_depth.hpp"
@@ -54,13 +54,14 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
                    training_data(input.session.folder, model, input.samples(model.modality),
                                  config.max_width_px, context.progress));
   if (modality == Modality::visible && context.has("depth")) {
-    ORBITFUSE_ASSIGN(data.depth, load_depth_maps(context.of("depth")));
+    ORBITFUSE_ASSIGN(std::vector<DepthMap> maps, load_depth_maps(context.of("depth")));
+    data.depth = of_learned(std::move(maps), learned);
   }
   nerf::TrainOptions options = config.options;
   StageOutput output;
   if (const std::vector<std::string>& left_out = learned.left_out; !left_out.empty())
     output.skips.push_back({fmt::format("{} posed photos", left_out.size()),
-                            fmt::format("in doubt: {}", fmt::join(left_out, ", ")),
+                            "in doubt: " + first_names(left_out, 4),
                             fmt::format("the field learns from the other {}", model.views.size())});
   nerf::Field guide;
   if (modality == Modality::thermal && options.shared_geometry) {

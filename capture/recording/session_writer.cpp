@@ -182,7 +182,10 @@ Status SessionWriter::append_line(const std::string& line) {
     }
     done += static_cast<std::size_t>(n);
   }
-  if (::fdatasync(manifest_fd_) != 0) return manifest_failure(folder_, errno);
+  if (::fdatasync(manifest_fd_) != 0) {  // where a disk gives its room late: no line either
+    const int cause = errno;
+    return manifest_failure(folder_, ::ftruncate(manifest_fd_, before) == 0 ? cause : errno);
+  }
   manifest_bytes_ = before + static_cast<off_t>(bytes.size());
   return {};
 }

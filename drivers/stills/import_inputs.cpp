@@ -31,7 +31,8 @@ class Gathering {
     thermal_files.insert(thermal_files.end(), thermal_tracking.begin(), thermal_tracking.end());
     ORBITFUSE_ASSIGN(inputs_.known, read_known_poses(options_, thermal_files, remarks_));
     if (options_.thermal.empty()) thermal = files_of_transforms(Modality::thermal);
-    ORBITFUSE_ASSIGN(const auto visible, visible_sources());
+    ORBITFUSE_ASSIGN(auto visible, visible_sources());
+    share_one_folder(visible, thermal);
     ORBITFUSE_ASSIGN(const auto visible_tracking,
                      listed(Modality::visible, options_.visible_tracking));
     ORBITFUSE_TRY(check_given_once(visible, visible_tracking));
@@ -50,7 +51,6 @@ class Gathering {
                   "a thermal image, and so are all of the photos",
                   "give it with --thermal (--embedded-visible takes the photos inside), and photos "
                   "with --visible");
-    share_one_folder();
     ORBITFUSE_TRY(check_roles());
     take_out_copies(Modality::visible, {&inputs_.visible, &inputs_.visible_tracking});
     take_out_copies(Modality::thermal, {&inputs_.thermal, &inputs_.thermal_tracking});
@@ -207,7 +207,6 @@ class Gathering {
         if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
           decoder_.observe(*thermal, source.short_name());
           source.taken_ns = thermal->taken_ns;
-          source.more_than_8_bits = thermal->kind != ThermalFile::Kind::gray8;
         }
         sources.push_back(source);
       }
@@ -234,26 +233,33 @@ class Gathering {
     }
   }
 
-  /// A folder that holds both orbits may be given as either: its files say which they are of.
-  void share_one_folder() {
-    std::vector<Source>&photos = inputs_.visible, &thermal = inputs_.thermal;
-    std::set<std::string> shown, measured;  // by content
-    for (const Source& photo : photos) shown.insert(photo.hash);
-    for (const Source& source : thermal)
-      if (source.more_than_8_bits) measured.insert(source.hash);
-    const auto is_shown = [&](const Source& source) { return shown.contains(source.hash); };
-    const auto is_measured = [&](const Source& source) { return measured.contains(source.hash); };
-    const auto measures = std::count_if(thermal.begin(), thermal.end(), is_measured);
-    const auto count = static_cast<std::ptrdiff_t>(thermal.size());
-    if (measures == 0 || measures == count ||
-        !std::all_of(thermal.begin(), thermal.end(), is_shown))
+  /// A folder that holds both orbits may be given as either: its files say which they are of. Not
+  /// where the photos are the thermal images' previews, of their names and sizes.
+  void share_one_folder(std::vector<fs::path>& photos, std::vector<fs::path>& thermal) {
+    const std::set<fs::path> shown(photos.begin(), photos.end());
+    if (!std::all_of(thermal.begin(), thermal.end(),
+                     [&](const fs::path& file) { return shown.contains(file); }))
       return;
-    std::erase_if(thermal, [&](const Source& source) { return !is_measured(source); });
-    std::erase_if(photos, is_measured);
+    std::set<fs::path> measured;
+    std::map<std::string, cv::Size> measured_sizes, shown_sizes;  // by name without extension
+    for (const fs::path& file : thermal) {
+      const Result<ThermalFile> read = read_thermal_file(file, 0);
+      if (!read) continue;
+      const bool measures = read->kind != ThermalFile::Kind::gray8;
+      if (measures) measured.insert(file);
+      (measures ? measured_sizes : shown_sizes)[file.stem().string()] = read->image.size();
+    }
+    const bool previews =
+        std::all_of(shown_sizes.begin(), shown_sizes.end(), [&](const auto& photo) {
+          const auto found = measured_sizes.find(photo.first);
+          return found != measured_sizes.end() && found->second == photo.second;
+        });
+    if (measured.empty() || previews) return;
+    std::erase_if(thermal, [&](const fs::path& file) { return !measured.contains(file); });
+    std::erase_if(photos, [&](const fs::path& file) { return measured.contains(file); });
     remarks_.add(fmt::format(
-        "one folder given as both: its {} images of more than 8 bits are taken as thermal, the "
-        "other {} as photos",
-        measures, photos.size()));
+        "one folder given as both: its {} thermal images are told from the other {}, photos",
+        thermal.size(), photos.size()));
   }
 
   /// One folder given twice is no pair of orbits.

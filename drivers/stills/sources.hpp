@@ -17,10 +17,9 @@ namespace orbitfuse {
 struct Source {
   std::filesystem::path file;
   int page = 0, pages = 1;
-  bool video = false;             ///< some of its frames become images
-  bool radiometric = false;       ///< a radiometric JPEG among photos
-  bool more_than_8_bits = false;  ///< a thermal file that is no photo
-  std::string hash;               ///< of the file's bytes; empty: it can't be read
+  bool video = false;        ///< some of its frames become images
+  bool radiometric = false;  ///< a radiometric JPEG among photos
+  std::string hash;          ///< of the file's bytes; empty: it can't be read
   std::optional<std::int64_t> taken_ns;
   int position = 0;  ///< in capture order, counting files that turn out unreadable
 

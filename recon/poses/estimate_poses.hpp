@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -103,7 +104,9 @@ struct ThermalPoses : ModalityPoses {
 
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {
-  Reconstruction reconstruction;
+  Reconstruction reconstruction;  ///< of the photos that its field learned from
+  /// Of all posed photos, where these are more: a rig's thermal images stand beside them.
+  std::optional<Reconstruction> posed;
   SceneRenderer renderer;  ///< of its trained field; without it only a rig places thermal views
 };
 

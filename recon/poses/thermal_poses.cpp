@@ -61,7 +61,8 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
                      "neither names nor times pair four fifths of the thermal frames with photos",
                      0, static_cast<int>(frames.size()), 0});
   if (!rig.pairs.empty()) {
-    auto by_rig = pose_by_rig(session, visible->reconstruction, rig, progress, steps);
+    auto by_rig = pose_by_rig(session, visible->posed ? *visible->posed : visible->reconstruction,
+                              rig, progress, steps);
     if (!by_rig && by_rig.error().kind != ErrorKind::quality) return by_rig;
     if (by_rig) {
       by_rig->ladder = std::move(steps);

@@ -65,11 +65,14 @@ class ScriptedSource : public FrameSource {
     script_.pop_front();
     return d;
   }
-  void stop() override { ++stops; }
+  void stop() override {
+    ++stops;
+    if (at_stop) at_stop();
+  }
   bool can_wait() const override { return waits; }
 
   bool fail_start = false, fail_at_end = false, waits = false;
-  std::function<void()> before_next;
+  std::function<void()> before_next, at_stop;
   std::chrono::milliseconds pause{0};
   int stops = 0;
 

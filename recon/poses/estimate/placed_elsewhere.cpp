@@ -45,7 +45,7 @@ std::optional<std::string> why_not_here(const OtherPlace& place, double shift,
         "the other views' points place it {:.1f} % of the orbit's radius aside, where {} of its "
         "matches agree, here {}",
         100 * shift, there, here);
-  if (shift >= options.open_shift && there >= here)
+  if (shift >= options.open_shift && there + std::sqrt(std::max(there, 1)) >= here)
     return fmt::format(
         "the other views' points leave its place open: {:.1f} % of the orbit's radius aside {} of "
         "its matches agree, here {}",

@@ -16,8 +16,9 @@ struct PlacedElsewhereOptions {
   double least_shift = 0.01;
   /// By how many standard deviations of a count more of its matches must agree there than here.
   double more_sigmas = 3;
-  /// Of the orbit's radius: where as many agree this far aside as here, they hold it in neither
-  /// place. Right views lie up to 0.026 aside by noise, a wrong one 0.063 (`five_drums`).
+  /// Of the orbit's radius: where as many (but for one standard deviation) agree this far aside,
+  /// they hold it in neither place. Right views lie up to 0.026 aside by noise, a wrong one 0.063
+  /// (`five_drums`).
   double open_shift = 0.04;
 };
 

@@ -58,6 +58,23 @@ TEST_F(LearnedViewsTest, PhotosInDoubtAreLeftOutWithTheirObservations) {
   }
 }
 
+TEST_F(LearnedViewsTest, DepthMapsFollowTheirPhotos) {
+  pose(Modality::visible, 2);
+  const LearnedViews views = learned(Modality::visible);
+  const auto posed = load_poses(context_.of("poses_visible"), Modality::visible);
+  ASSERT_TRUE(posed);
+  std::vector<DepthMap> maps(posed->views.size() + 1);  // the last one of no view
+  for (std::size_t i = 0; i < maps.size(); ++i) {
+    maps[i].view = static_cast<int>(i);
+    maps[i].camera.width = static_cast<int>(i);  // tells it from the others
+  }
+  const std::vector<DepthMap> followed = of_learned(maps, views);
+  ASSERT_EQ(followed.size(), 22u);
+  for (const DepthMap& map : followed)
+    EXPECT_EQ(views.model.views.at(static_cast<std::size_t>(map.view)).name,
+              posed->views.at(static_cast<std::size_t>(map.camera.width)).name);
+}
+
 TEST_F(LearnedViewsTest, OfASessionInDoubtAsAWholeAllAreTaken) {
   pose(Modality::visible, 6);
   EXPECT_EQ(learned(Modality::visible).model.views.size(), 18u);

@@ -231,12 +231,12 @@ TEST(Recorder, AGapThatAFullDiskRefusesIsToldAtTheEnd) {
   };
   int asked = 0;
   source.before_next = [&] {
-    const auto wait_for = [](const auto& met) {
-      while (!met()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    };
-    if (++asked == 3) wait_for([&] { return filled.load(); });
-    if (asked != 4) return;
-    wait_for([&] { return recorder.status()[0].unwritten > 0; });
+    if (++asked != 3) return;
+    while (!filled) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  source.at_stop = [&] {
+    while (recorder.status()[0].unwritten == 0)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     full.reset();
   };
   EXPECT_FALSE(recorder.run({&source}));

@@ -195,16 +195,28 @@ TEST_F(LeftOut, ImagesOfOneNameAreToldApartByTheirFoldersOrNotAtAll) {
 
 TEST_F(LeftOut, OneFolderThatHoldsBothOrbitsIsSharedOut) {
   for (int i = 0; i < 4; ++i) {
-    put_photo(fmt::format("in/{}.jpg", i), static_cast<std::uint64_t>(i));
-    put_counts(fmt::format("in/{}.tif", i), 29300, 29700, static_cast<std::uint64_t>(i));
+    cv::Mat photo(60, 80, CV_8UC3);
+    cv::RNG(static_cast<std::uint64_t>(i) + 1).fill(photo, cv::RNG::UNIFORM, 0, 255);
+    put(fmt::format("in/{}.png", i), *encode_png(photo));
+    put_counts(fmt::format("in/{}.tif", i), 2000, 3000, static_cast<std::uint64_t>(i));
   }
   options.visible = options.thermal = {folder / "in"};
   const auto report = import();
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->visible, 4);
   EXPECT_EQ(report->thermal, 4);
-  EXPECT_THAT(report->warnings, test::one_says("one folder given as both: its 4 images"));
+  EXPECT_THAT(report->warnings, test::one_says("one folder given as both: its 4 thermal images"));
   EXPECT_THAT(report->warnings, test::none_says("left out"));
+  EXPECT_THAT(report->warnings, test::none_says("0.png")) << "a photo is no thermal file in colour";
+}
+
+TEST_F(LeftOut, PreviewsOfThermalImagesAreNoPhotos) {
+  for (int i = 0; i < 4; ++i) {
+    put(fmt::format("in/{}.png", i), *encode_png(cv::Mat(30, 40, CV_8UC1, cv::Scalar(9 + i))));
+    put_counts(fmt::format("in/{}.tif", i), 29300, 29700, static_cast<std::uint64_t>(i));
+  }
+  options.visible = options.thermal = {folder / "in"};
+  EXPECT_THAT(refusal(), test::says("photos are no thermal images"));
 }
 
 TEST_F(LeftOut, ALinkToASiblingIsOneImage) {

@@ -55,8 +55,8 @@ TEST(PlacedElsewhere, RightViewsAreNotNamedHoweverFewMatchesTheyHold) {
   EXPECT_TRUE(named->empty()) << named->front().why;
 }
 
-/// Half of what view 5 matches where it would be from another place: its matches leave open
-/// which of the two it is.
+/// Half of what view 5 matches (two thirds of what is in its points) where it would be from another
+/// place: its matches leave open which of the two it is.
 FeatureScene with_a_view_of_two_places(double turn_rad) {
   FeatureScene scene = testing_orbit::described_scene();
   const Reconstruction truth = with_a_view_aside(scene, 0);
