@@ -117,6 +117,7 @@ Result<StageOutput> pose_thermal(const StageContext& context, const SessionInput
   if (visible) {
     ORBITFUSE_ASSIGN(LearnedViews learned, learned_views(context, Modality::visible));
     scene.reconstruction = std::move(learned.model);
+    ORBITFUSE_ASSIGN(scene.doubts, load_doubts(context.of("poses_visible")));
     if (!learned.left_out.empty()) {
       ORBITFUSE_ASSIGN(scene.posed, load_poses(context.of("poses_visible"), Modality::visible));
     }

@@ -107,6 +107,7 @@ struct VisibleScene {
   Reconstruction reconstruction;  ///< of the photos that its field learned from
   /// Of all posed photos, where these are more: a rig's thermal images stand beside them.
   std::optional<Reconstruction> posed;
+  std::map<std::string, std::string> doubts;  ///< why posed photos are in doubt, by their names
   SceneRenderer renderer;  ///< of its trained field; without it only a rig places thermal views
 };
 

@@ -65,6 +65,7 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
                               rig, progress, steps);
     if (!by_rig && by_rig.error().kind != ErrorKind::quality) return by_rig;
     if (by_rig) {
+      doubt_beside(visible->doubts, rig, *by_rig);
       by_rig->ladder = std::move(steps);
       return by_rig;
     }

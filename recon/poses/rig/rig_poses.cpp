@@ -7,6 +7,7 @@
 #include <map>
 
 #include "recon/alignment/luminance.hpp"
+#include "recon/poses/estimate/weakly_held.hpp"
 #include "recon/poses/thermal_lens.hpp"
 
 namespace orbitfuse {
@@ -110,6 +111,19 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
   step.posed = static_cast<int>(result.reconstruction.views.size());
   steps.push_back(step);
   return result;
+}
+
+void doubt_beside(const std::map<std::string, std::string>& doubted_photos, const RigPairs& rig,
+                  ThermalPoses& poses) {
+  for (const PosedView& view : poses.reconstruction.views)
+    for (const auto& [photo, thermal] : rig.pairs) {
+      const auto doubted = doubted_photos.find(photo->file);
+      if (thermal->file == view.name && doubted != doubted_photos.end())
+        add_doubt(
+            {view.name, DoubtReason::uncertain_place,
+             fmt::format("its photo, {}, may be misplaced: {}", photo->file, doubted->second)},
+            poses.doubtful);
+    }
 }
 
 }  // namespace orbitfuse

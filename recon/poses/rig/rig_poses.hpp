@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <map>
+#include <string>
+
 #include "recon/poses/estimate_poses.hpp"
 #include "recon/poses/rig/rig_estimate.hpp"
 #include "recon/poses/rig/rig_pairs.hpp"
@@ -13,5 +16,9 @@ namespace orbitfuse {
 Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& visible,
                                  const RigPairs& rig, const Progress& progress,
                                  std::vector<LadderStep>& steps);
+
+/// A thermal image whose photo is in doubt is as far off as that.
+void doubt_beside(const std::map<std::string, std::string>& doubted_photos, const RigPairs& rig,
+                  ThermalPoses& poses);
 
 }  // namespace orbitfuse

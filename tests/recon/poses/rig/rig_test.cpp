@@ -10,6 +10,7 @@
 #include "recon/poses/rig/rig_estimate.hpp"
 #include "recon/poses/rig/rig_image.hpp"
 #include "recon/poses/rig/rig_pairs.hpp"
+#include "recon/poses/rig/rig_poses.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -201,6 +202,20 @@ TEST(RigPairs, EqualNamesArePairs) {
     EXPECT_EQ(photo->modality, Modality::visible);
     EXPECT_EQ(photo->file.substr(8), thermal->file.substr(8));
   }
+}
+
+TEST(RigPairs, AnImageBesideAPhotoInDoubtIsInDoubt) {
+  const Session session = paired_session(5);
+  const RigPairs rig = find_rig_pairs(session);
+  ThermalPoses poses;
+  for (const int posed : {0, 2, 3})
+    poses.reconstruction.views.push_back({"thermal/" + std::to_string(posed), {}, {}});
+  poses.doubtful.push_back({"thermal/3", DoubtReason::weak_support, "its own"});
+  doubt_beside({{"visible/1", "not posed"}, {"visible/2", "so"}, {"visible/3", "so"}}, rig, poses);
+  ASSERT_EQ(poses.doubtful.size(), 2u);
+  EXPECT_EQ(poses.doubtful[0].why, "its own");
+  EXPECT_EQ(poses.doubtful[1].name, "thermal/2");
+  EXPECT_EQ(poses.doubtful[1].why, "its photo, visible/2, may be misplaced: so");
 }
 
 /// The names of two folders' files, by the number or time in them.
