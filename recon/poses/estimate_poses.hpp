@@ -105,10 +105,11 @@ struct ThermalPoses : ModalityPoses {
 /// The visible world that thermal views are localised in; images come from the session's paths.
 struct VisibleScene {
   Reconstruction reconstruction;  ///< of the photos that its field learned from
-  /// Of all posed photos, where these are more: a rig's thermal images stand beside them.
-  std::optional<Reconstruction> posed;
-  std::map<std::string, std::string> doubts;  ///< why posed photos are in doubt, by their names
   SceneRenderer renderer;  ///< of its trained field; without it only a rig places thermal views
+  /// Of all posed photos, where these are more: a rig's thermal images stand beside them.
+  std::optional<Reconstruction> posed = std::nullopt;
+  /// Why posed photos are in doubt, by their names.
+  std::map<std::string, std::string> doubts = {};
 };
 
 /// Visible views: known poses that the photos don't contradict, else COLMAP with orbit-limited
