@@ -8,6 +8,7 @@
 #include <set>
 #include <utility>
 
+#include "recon/poses/doubts.hpp"
 #include "recon/poses/estimate/feature_level.hpp"
 #include "recon/poses/estimate/model_selection.hpp"
 #include "recon/poses/estimate/placed_elsewhere.hpp"

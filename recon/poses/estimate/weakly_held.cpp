@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "recon/poses/doubts.hpp"
 #include "recon/poses/estimate/center_uncertainty.hpp"
 #include "recon/poses/index.hpp"
 
@@ -62,11 +63,6 @@ std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
   const auto order = [](const DoubtfulView& a, const DoubtfulView& b) { return a.name < b.name; };
   std::sort(views.begin(), views.end(), order);
   return views;
-}
-
-void add_doubt(DoubtfulView view, std::vector<DoubtfulView>& doubtful) {
-  const auto is_it = [&](const DoubtfulView& known) { return known.name == view.name; };
-  if (std::none_of(doubtful.begin(), doubtful.end(), is_it)) doubtful.push_back(std::move(view));
 }
 
 void doubt_beyond(const Joint& joint, const Reconstruction& model,

@@ -27,9 +27,6 @@ struct WeaklyHeldOptions {
 std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
                                       const WeaklyHeldOptions& options = {});
 
-/// Unless the view is in doubt already.
-void add_doubt(DoubtfulView view, std::vector<DoubtfulView>& doubtful);
-
 /// The views beyond a loose joint: right in themselves, but not sure where the rest is. Adds those
 /// that are not in doubt already; nothing where the joint is not loose.
 void doubt_beyond(const Joint& joint, const Reconstruction& model,

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "recon/alignment/luminance.hpp"
-#include "recon/poses/estimate/weakly_held.hpp"
+#include "recon/poses/doubts.hpp"
 #include "recon/poses/thermal_lens.hpp"
 
 namespace orbitfuse {
