@@ -13,6 +13,7 @@
 #include "core/geometry/scene_ball.hpp"
 #include "core/numeric/median.hpp"
 #include "recon/assembly/field_surface.hpp"
+#include "recon/assembly/looked_at.hpp"
 
 namespace orbitfuse::exporting {
 namespace {
@@ -157,8 +158,14 @@ Result<Pointed> pointed(const view::FinishedRun& run, const Place& place,
   if (const auto* pixel = std::get_if<PixelPlace>(&place))
     return pointed_pixel(run, *pixel, progress);
   const Eigen::Vector3d& point = std::get<Eigen::Vector3d>(place);
-  if (!point.allFinite() || !(point.norm() < 1e9))
+  if (!point.allFinite())
     return fail(ErrorKind::usage, "--distance", "a point that is not finite", "write X,Y,Z");
+  if (const double off = (point - run.center).norm(); !(off <= surroundings_reach * run.radius))
+    return fail(ErrorKind::usage, "--distance",
+                fmt::format("a point outside of the scene: {:.3g} from its middle, the cameras "
+                            "stand {:.3g} from it",
+                            off, run.radius),
+                "give coordinates of this run's world, or pixels of recorded views");
   const double off = point_share * run.radius;
   return Pointed{point, Eigen::Vector3d::UnitZ(), off, off};
 }

@@ -45,8 +45,9 @@ Result<InspectionModel> inspection_of(const fs::path& out, const Session& sessio
   ORBITFUSE_ASSIGN(const measurement::ThermalScene scene,
                    stages::load_measurement_scene(out, session));
   ORBITFUSE_ASSIGN(
-      const measurement::Measurements saved,
+      measurement::Measurements saved,
       measurement::load_measurements(out / measurement::measurements_file, scene.identity()));
+  bring_to_scale(saved, scene.metres_per_unit(), scene.scale_relative_sigma());
   ORBITFUSE_ASSIGN(const std::vector<InspectionFinding> findings, findings_of(saved, details));
   ORBITFUSE_ASSIGN(const view::FinishedRun run, view::load_finished_run(out, config, progress));
   InspectionModel model;

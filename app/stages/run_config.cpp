@@ -79,7 +79,8 @@ void add_poses(Settings& settings, PoseOptions& poses) {
                "Longest image side given to COLMAP");
   settings.add("poses.max_features", poses.max_features, "SIFT features a view");
   settings.add("poses.min_posed_ratio", poses.min_posed_ratio,
-               "Below this share of posed views the next method is tried");
+               "Below this share of posed views the next method is tried; of photos 0.7 have to do "
+               "where none finds more and stations confirm them, unless above 0.8 are asked for");
   settings.add("poses.max_reprojection_rms_px", poses.max_reprojection_rms_px,
                "Above this error a model is not believed");
   settings.add(

@@ -107,8 +107,12 @@ Result<report::Table> measurement_table(const fs::path& out, const Session& sess
   std::error_code unreadable;
   if (!fs::exists(file, unreadable) && !unreadable) return table;
   ORBITFUSE_ASSIGN(const std::string identity, measurement_identity(out, session));
-  ORBITFUSE_ASSIGN(const measurement::Measurements saved,
-                   measurement::load_measurements(file, identity));
+  ORBITFUSE_ASSIGN(measurement::Measurements saved, measurement::load_measurements(file, identity));
+  ORBITFUSE_ASSIGN(const std::optional<MetricScale> scale, scale_of_run(out));
+  if (scale)
+    bring_to_scale(saved, scale->metres_per_unit, scale->relative_uncertainty);
+  else
+    bring_to_scale(saved, std::nullopt, 0);
   for (const SavedMeasurement& m : saved.list) {
     const auto answer = measurement::answer_of_json(m.answer);
     if (!answer)

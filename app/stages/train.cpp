@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "app/stages/artifacts.hpp"
 #include "app/stages/learned_views.hpp"
 #include "app/stages/stage_list.hpp"
@@ -45,6 +47,14 @@ Status take_refined_poses(const nerf::TrainReport& report, const StageContext& c
   return save_poses(context, session, all);
 }
 
+/// Raw counts of a thermal camera, which no curve or palette turned.
+bool all_are_counts(const Session& session, Modality modality) {
+  const auto frames = session.frames_of(modality, false);
+  return !frames.empty() && std::all_of(frames.begin(), frames.end(), [](const FrameRecord* f) {
+    return f->has_flag(FrameFlag::raw_counts);
+  });
+}
+
 Result<StageOutput> train(const StageContext& context, const SessionInput& input,
                           const TrainConfig& config, Modality modality, const json& resolved,
                           nerf::KeptRenders* kept) {
@@ -53,6 +63,7 @@ Result<StageOutput> train(const StageContext& context, const SessionInput& input
   ORBITFUSE_ASSIGN(nerf::Dataset data,
                    training_data(input.session.folder, model, input.samples(model.modality),
                                  config.max_width_px, context.progress));
+  data.counts = all_are_counts(input.session, modality);
   if (modality == Modality::visible && context.has("depth")) {
     ORBITFUSE_ASSIGN(std::vector<DepthMap> maps, load_depth_maps(context.of("depth")));
     data.depth = of_learned(std::move(maps), learned);
@@ -138,7 +149,7 @@ pipeline::Stage train_stage(const StageInputs& in, Modality modality) {
   pipeline::Stage stage;
   stage.name = "train_" + modality_name;
   // Thermal fields without a guide match their own depth: theirs rises with the depth stage's, too.
-  stage.version = visible ? 7 : 11;
+  stage.version = visible ? 7 : 12;
   stage.needs = {"poses_" + modality_name};
   stage.uses = {visible ? "depth" : "train_visible"};
   stage.options = in.config->settings().to_json("train." + modality_name);

@@ -86,14 +86,25 @@ Result<FileOptions> file_options(const ExportArguments& o, const view::FinishedR
   return files;
 }
 
+/// Whether a word that reads as a number is the name of a view: new views are called 000, 001 ...
+bool names_new_view(const std::string& out, const std::string& word) {
+  const bool digits = word.find_first_not_of("0123456789") == std::string::npos;
+  std::error_code ignored;
+  return digits && ((word.size() > 1 && word[0] == '0') ||
+                    fs::exists(fs::path(out) / "render/depth" / (word + ".tiff"), ignored));
+}
+
 /// VIEW,U,V or X,Y,Z: the first word decides.
-Result<measurement::Place> place_of(const std::string& word) {
+Result<measurement::Place> place_of(const std::string& out, const std::string& word) {
   constexpr const char* form = "write VIEW,U,V (a pixel of a recorded view) or X,Y,Z";
   double first = 0;
   const auto [stop, error] = std::from_chars(word.data(), word.data() + word.size(), first);
   const std::size_t comma = word.find(',');
   if (comma == std::string::npos || comma == 0)
     return fail(ErrorKind::usage, "--distance", "'" + word + "'", form);
+  if (names_new_view(out, word.substr(0, comma)))
+    return fail(ErrorKind::usage, "--distance", "'" + word + "', a pixel of a rendered view",
+                "point at one of a recorded view, e.g. visible/000003.jpg,320,240");
   if (error == std::errc() && stop == word.data() + comma) {
     ORBITFUSE_ASSIGN(const auto v, numbers("--distance", word, 3, "X,Y,Z or VIEW,U,V"));
     return Eigen::Vector3d(v[0], v[1], v[2]);
@@ -129,8 +140,8 @@ Result<std::optional<stages::MetricScale>> scale_of(Context& context, const Expo
                         {{"mat.size_m", "--mat"}, {"mat.tags_per_side", "--mat-tags"}});
       });
     }
-    ORBITFUSE_ASSIGN(const measurement::Place from, place_of(o.distance.at(0)));
-    ORBITFUSE_ASSIGN(const measurement::Place to, place_of(o.distance.at(1)));
+    ORBITFUSE_ASSIGN(const measurement::Place from, place_of(o.out, o.distance.at(0)));
+    ORBITFUSE_ASSIGN(const measurement::Place to, place_of(o.out, o.distance.at(1)));
     ORBITFUSE_ASSIGN(const double metres, metres_of("--distance", o.distance.at(2)));
     return scale_of_distance(run, from, to, metres, context.progress);
   };

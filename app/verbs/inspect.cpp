@@ -119,7 +119,7 @@ void tell_session(Context& context, const fs::path& folder, const std::string& s
 /// What lies in the place of a stage's result without being one: no verb reads it, and a run
 /// refuses to replace it.
 void tell_without_record(Context& context, const fs::path& folder,
-                         const std::set<std::string>& finished) {
+                         const std::set<std::string>& finished, std::vector<std::string>& damaged) {
   json names = json::array();
   for (const std::string& stage : stages::stage_names()) {
     std::error_code unreadable;
@@ -128,6 +128,7 @@ void tell_without_record(Context& context, const fs::path& folder,
         (fs::is_directory(place, unreadable) && fs::is_empty(place, unreadable)))
       continue;
     names.push_back(stage);
+    damaged.push_back(stage + ": its record is missing");
     context.console.warning(fmt::format(
         "{}: there, but without a record ({}): nothing uses it, and the next run refuses to "
         "replace it; move it away, and run again",
@@ -186,7 +187,7 @@ Status inspect_run(Context& context, const fs::path& folder) {
       context.console.warning(record->stage + ": " + warning);
     stages.push_back(to_json(*record));
   }
-  tell_without_record(context, folder, finished);
+  tell_without_record(context, folder, finished, damaged);
   tell_failed(context, folder);
   const std::vector<std::string> late = pipeline::out_of_date(folder, finished);
   for (const std::string& stage : late)

@@ -129,7 +129,8 @@ Status run(Context& context, const MeasureArguments& options) {
   const auto saved = load_measurements(file, scene.identity());
   if (!saved && options.words.save) return tl::unexpected(saved.error());
   if (!saved) context.console.warning(saved.error().message());
-  const Measurements known = saved.value_or(Measurements{});
+  Measurements known = saved.value_or(Measurements{});
+  bring_to_scale(known, scene.metres_per_unit(), scene.scale_relative_sigma());
   for (const std::string& note : known.notes) context.console.warning(note);
   ORBITFUSE_TRY(check_reference(words.reference, known, file.string()));
   ORBITFUSE_ASSIGN(const auto request, request_of(options.words, scene, known));

@@ -84,7 +84,9 @@ Result<Request> spot_or_saved(const std::string& option, const std::string& word
   if (parts.size() != 3)
     return wrong_word(option, word, "VIEW,U,V, or X,Y,Z, or the name of a saved measurement");
   // "000" is the name of a rendered view before it is a number.
-  const bool pixel = scene.has_view(parts[0]) || !number(parts[0]);
+  const bool numbered = parts[0].size() > 1 && parts[0][0] == '0' &&
+                        parts[0].find_first_not_of("0123456789") == std::string::npos;
+  const bool pixel = scene.has_view(parts[0]) || numbered || !number(parts[0]);
   ORBITFUSE_ASSIGN(Place place, pixel ? pixel_of(option, word) : point_of(option, word));
   request.places = {std::move(place)};
   return request;

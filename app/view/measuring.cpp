@@ -86,8 +86,9 @@ Result<json> Measuring::remove(const std::string& name) {
 Result<json> Measuring::list() {
   ORBITFUSE_ASSIGN(const measurement::ThermalScene* scene, this->scene());
   ORBITFUSE_ASSIGN(
-      const measurement::Measurements saved,
+      measurement::Measurements saved,
       measurement::load_measurements(run_.out / measurement::measurements_file, scene->identity()));
+  bring_to_scale(saved, scene->metres_per_unit(), scene->scale_relative_sigma());
   json entries = json::array();
   for (const measurement::SavedMeasurement& m : saved.list) entries.push_back(to_json(m));
   return entries;

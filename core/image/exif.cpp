@@ -83,8 +83,12 @@ ExifInfo read_exif(std::string_view bytes) {
     // It also reads videos, for minutes when a size in them is damaged.
     const int type = Exiv2::ImageFactory::getType(data_begin, size);
     if (type != Exiv2::ImageType::jpeg && type != Exiv2::ImageType::png &&
-        type != Exiv2::ImageType::tiff)
+        type != Exiv2::ImageType::tiff) {
+      // A BigTIFF, which it doesn't know.
+      if (image_format(bytes) == ImageFormat::tiff)
+        info.orientation = tiff_orientation(bytes).value_or(1);
       return info;
+    }
     const auto image = Exiv2::ImageFactory::open(data_begin, size);
     image->readMetadata();
     const Exiv2::ExifData& data = image->exifData();
@@ -106,6 +110,7 @@ ExifInfo read_exif(std::string_view bytes) {
     info.taken_ns = epoch_ns(text_of(data, "Exif.Photo.DateTimeOriginal"),
                              text_of(data, "Exif.Photo.SubSecTimeOriginal"), offset.value_or(0));
     info.taken_has_offset = offset.has_value();
+    info.utc_offset_s = offset.value_or(0);
   } catch (const std::exception&) {
     // No or broken metadata: what was read so far stands.
   }

@@ -16,6 +16,7 @@ struct ExifInfo {
   std::optional<std::int64_t> taken_ns;  ///< DateTimeOriginal with SubSec; UTC if an offset is
                                          ///< given, else the camera's clock read as UTC
   bool taken_has_offset = false;
+  std::int64_t utc_offset_s = 0;  ///< that offset: local time less UTC
   std::string make, model, serial;
 };
 

@@ -3,12 +3,14 @@
 
 #include <fmt/format.h>
 
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/image/temperature_unit.hpp"
 #include "core/image/transparency.hpp"
 #include "core/nested_text.hpp"
 
@@ -235,7 +237,32 @@ bool is_of_a_scale(std::string_view text) {
   return false;
 }
 
+/// Of a name as people and programs write it.
+std::optional<TemperatureUnit> temperature_unit_called(std::string name) {
+  for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const std::string_view frill : {"degrees", "degree", "deg", "\u00b0", "[", "]", " ", "_"})
+    for (std::size_t at; (at = name.find(frill)) != name.npos;) name.erase(at, frill.size());
+  if (name == "k" || name == "kelvin" || name == "kelvins") return TemperatureUnit::kelvin;
+  if (name == "c" || name == "celsius" || name == "centigrade") return TemperatureUnit::celsius;
+  for (const char* other :
+       {"f", "fahrenheit", "rankine", "centikelvin", "ck", "millikelvin", "mk", "decikelvin", "dk"})
+    if (name == other) return TemperatureUnit::other;
+  return std::nullopt;
+}
+
 }  // namespace
+
+std::optional<TemperatureUnit> temperature_unit_of(std::string_view text) {
+  const auto value = parse_json(text);
+  if (!value.is_object() || !value.contains("unit") || !value["unit"].is_string())
+    return std::nullopt;
+  return temperature_unit_called(value["unit"].get<std::string>());
+}
+
+bool says_zero_is_none(std::string_view text) {
+  const auto value = parse_json(text);
+  return value.is_object() && value.contains("invalid") && value["invalid"] == 0;
+}
 
 Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
                                                                     const std::string& where) {
@@ -267,8 +294,7 @@ Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_
   }
   // Celsius would be off by 273 and look like a temperature all the same.
   if (const auto unit = value.find("unit"); unit != value.end() && unit->is_string()) {
-    const auto name = unit->get<std::string>();
-    if (name != "kelvin" && name != "Kelvin" && name != "K")
+    if (temperature_unit_called(unit->get<std::string>()) != TemperatureUnit::kelvin)
       return fail(ErrorKind::input, where, fmt::format("\"unit\": {}", unit->dump().substr(0, 40)),
                   "only kelvin = scale * count + offset is read (of Celsius add 273.15 to the "
                   "offset): write \"unit\": \"kelvin\"");

@@ -24,12 +24,17 @@ struct JpegErrors {
   bool truncated;
   bool damaged;  ///< in the compressed data
   bool in_scan;  ///< past the headers
+  bool unread;   ///< of a kind that libjpeg doesn't decode
 };
 
 // libjpeg hands base back to the callbacks; it is the first member, so the cast is defined.
 JpegErrors& errors_of(j_common_ptr info) { return *reinterpret_cast<JpegErrors*>(info->err); }
 
 void on_fatal(j_common_ptr info) {
+  // 12 bits, lossless, arithmetic codes: such a file is whole.
+  const int code = info->err->msg_code;
+  errors_of(info).unread =
+      code == JERR_BAD_PRECISION || code == JERR_SOF_UNSUPPORTED || code == JERR_ARITH_NOTIMPL;
   info->err->format_message(info, errors_of(info).text);
   std::longjmp(errors_of(info).jump, 1);
 }
@@ -127,6 +132,10 @@ Result<cv::Mat> decode_jpeg(std::string_view bytes, const std::string& where) {
   cv::Mat image;
   const bool decoded = decode(bytes, info, errors, image);
   jpeg_destroy_decompress(&info);
+  if (errors.unread)
+    return fail(ErrorKind::input, where,
+                fmt::format("a kind of JPEG that is not read ({})", errors.text),
+                "convert it to an ordinary JPEG (8 bits, lossy) or to PNG");
   if (!decoded) {
     return fail(ErrorKind::input, where, fmt::format("damaged JPEG ({})", errors.text),
                 "copy the file again");

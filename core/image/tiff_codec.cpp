@@ -60,11 +60,34 @@ void to_first_page(TIFF* tiff) {
     }
 }
 
+enum class Chain { goes_on, ends, breaks_off };
+
+/// libtiff's "no further page" is also its answer to a link that leads nowhere.
+Chain next_directory(TIFF* tiff) {
+  if (TIFFLastDirectory(tiff)) return Chain::ends;
+  return TIFFReadDirectory(tiff) == 1 ? Chain::goes_on : Chain::breaks_off;
+}
+
 /// Advances to the next image of the first one's layout.
 bool next_page(TIFF* tiff, const TiffLayout& first) {
-  while (TIFFReadDirectory(tiff) == 1)
+  while (next_directory(tiff) == Chain::goes_on)
     if (alike(layout_of(tiff), first) && !is_copy(tiff)) return true;
   return false;
+}
+
+/// What a page says of its samples' scale or unit, else what the first does: programs write it once
+/// for the whole file.
+std::string description_of_page(std::string own, const std::string& firsts) {
+  const auto says_something = [](const std::string& text) {
+    return text.find("\"scale\"") != text.npos || text.find("\"unit\"") != text.npos;
+  };
+  return says_something(own) || !says_something(firsts) ? own : firsts;
+}
+
+std::string remedy_of(const TiffLayout& l) {
+  return depth_of(l) ? "convert it to 8 or 16-bit unsigned grey or RGB"
+                     : "convert it: temperatures to 32-bit floats (kelvin or Celsius) or to 16-bit "
+                       "unsigned (100 x kelvin), photos to 8-bit grey or RGB";
 }
 
 /// A TIFF in memory, at its first image until it is moved on.
@@ -114,14 +137,18 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
                              std::string* image_description, int page) {
   TiffPages tiff(bytes);
   if (!tiff) return fail(ErrorKind::input, where, "not a readable TIFF", "copy the file again");
+  const std::string firsts = image_description && page > 0 ? description_of(tiff.get()) : "";
   if (!tiff.go_to(page))
     return fail(ErrorKind::input, where, fmt::format("no page {}", page + 1),
                 "copy the file again");
   const TiffLayout l = layout_of(tiff.get());
-  if (std::string why = unread_layout(l); !why.empty()) {
-    return fail(ErrorKind::input, where, std::move(why),
-                "convert it to 8 or 16-bit unsigned grey or RGB");
-  }
+  if (std::string why = unread_layout(l); !why.empty())
+    return fail(ErrorKind::input, where, std::move(why), remedy_of(l));
+  if (l.channels == 2 && !has_alpha(tiff.get()))
+    return fail(ErrorKind::input, where,
+                "TIFF with 2 samples a pixel, of which none is called alpha: nothing says which is "
+                "meant",
+                "write the band that is meant into a TIFF of its own (gdal_translate -b 1)");
   if (l.photometric == PHOTOMETRIC_YCBCR)
     TIFFSetField(tiff.get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);
   const long long samples = 1LL * l.width * l.height * l.channels;
@@ -135,7 +162,7 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
     return fail(ErrorKind::input, where, std::move(why),
                 "its tags are damaged: copy or export the file again");
   if (image_description) {
-    if (std::string text = description_of(tiff.get()); !text.empty())
+    if (std::string text = description_of_page(description_of(tiff.get()), firsts); !text.empty())
       *image_description = std::move(text);
   }
   cv::Mat image(static_cast<int>(l.height), static_cast<int>(l.width),
@@ -145,6 +172,8 @@ Result<StoredPage> read_page(std::string_view bytes, const std::string& where,
   if (!whole || tiff.tag_is_cut()) {
     return fail(ErrorKind::input, where, "truncated or damaged TIFF", "copy the file again");
   }
+  // Nothing is measured to more digits than 32 bits hold.
+  if (image.depth() == CV_64F) image.convertTo(image, CV_32F);
   return StoredPage{l, image};
 }
 
@@ -170,19 +199,29 @@ std::string other_tiff_pages(std::string_view bytes) {
   const TiffPages tiff(bytes);
   if (!tiff) return {};
   std::vector<std::string> others;
+  Chain chain = Chain::ends;
   // The number is the directory's, by which other programs know it too.
-  for (int page = TIFFCurrentDirectory(tiff.get()) + 2;
-       page <= max_pages && TIFFReadDirectory(tiff.get()) == 1; ++page) {
+  int page = TIFFCurrentDirectory(tiff.get()) + 2;
+  for (; page <= max_pages; ++page) {
+    chain = next_directory(tiff.get());
+    if (chain != Chain::goes_on) break;
     const TiffLayout l = layout_of(tiff.get());
     if (is_copy(tiff.get()) || alike(l, tiff.first())) continue;
     others.push_back(fmt::format("{} ({}x{}, {}-bit{})", page, l.width, l.height, l.bits,
                                  l.channels > 1 ? fmt::format(", {} channels", l.channels) : ""));
   }
-  if (others.empty()) return {};
-  return fmt::format(
-      "page{} {}, of another size or kind than the first: previews, or another camera's images; "
-      "split the file (tiffsplit) to use them",
-      others.size() > 1 ? "s" : "", first_names(others, 3));
+  std::string words;
+  if (!others.empty())
+    words = fmt::format(
+        "page{} {}, of another size or kind than the first: previews, or another camera's images; "
+        "split the file (tiffsplit) to use them",
+        others.size() > 1 ? "s" : "", first_names(others, 3));
+  if (chain == Chain::breaks_off)
+    words += fmt::format(
+        "{}all pages from {} on: the link to it leads nowhere (the file is cut or damaged); copy "
+        "the file again",
+        words.empty() ? "" : ". And ", page);
+  return words;
 }
 
 Result<cv::Mat> decode_tiff(std::string_view bytes, const std::string& where,

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
 namespace orbitfuse {
@@ -74,6 +75,14 @@ std::string gdal_number(const std::string& metadata, const std::string& role, co
   return fmt::format("{}", number);
 }
 
+/// The text of GDAL's item of the unit (UNITTYPE), empty without one.
+std::string gdal_unit(const std::string& metadata) {
+  const std::size_t at = metadata.find("role=\"unittype\"");
+  const std::size_t begin = at == metadata.npos ? at : metadata.find('>', at);
+  if (begin == metadata.npos) return {};
+  return metadata.substr(begin + 1, metadata.find('<', begin) - begin - 1);
+}
+
 }  // namespace
 
 TiffLayout layout_of(TIFF* tiff) {
@@ -96,6 +105,7 @@ bool alike(const TiffLayout& a, const TiffLayout& b) {
 
 std::optional<int> depth_of(const TiffLayout& l) {
   if (l.format == SAMPLEFORMAT_IEEEFP && l.bits == 32) return CV_32F;
+  if (l.format == SAMPLEFORMAT_IEEEFP && l.bits == 64) return CV_64F;
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 16) return CV_16U;
   if (l.format == SAMPLEFORMAT_UINT && l.bits == 8) return CV_8U;
   return std::nullopt;
@@ -154,9 +164,17 @@ std::string description_of(TIFF* tiff) {
   // Whether a scale or an offset stood in the rest nobody knows.
   if (metadata.starts_with("<GDALMetadata") && is_cut(metadata))
     return R"({"scale":"GDAL's metadata, cut off"})";
-  if (metadata.find("role=\"scale\"") == metadata.npos) return description;
-  return fmt::format(R"({{"scale":{},"offset":{}}})", gdal_number(metadata, "scale", "1"),
-                     gdal_number(metadata, "offset", "0"));
+  const std::string unit = gdal_unit(metadata);
+  const std::string named =
+      unit.empty() ? ""
+                   : "\"unit\":" + nlohmann::json(unit).dump(
+                                       -1, ' ', false, nlohmann::json::error_handler_t::replace);
+  if (metadata.find("role=\"scale\"") == metadata.npos) {
+    const bool says_less = !unit.empty() && description.find("\"unit\"") == description.npos;
+    return says_less ? "{" + named + "}" : description;
+  }
+  return fmt::format(R"({{"scale":{},"offset":{}{}{}}})", gdal_number(metadata, "scale", "1"),
+                     gdal_number(metadata, "offset", "0"), unit.empty() ? "" : ",", named);
 }
 
 }  // namespace orbitfuse

@@ -13,18 +13,13 @@ namespace {
 /// sensor of 36 mm span 1.7 degrees.
 Status check_angle(const std::optional<double>& focal_px, const StillPhoto& still,
                    const std::string& where) {
-  constexpr double narrowest_deg = 1.5, widest_deg = 130;
-  if (!focal_px) return {};
-  const int across = std::max(still.size.width, still.size.height);
-  Camera camera;
-  camera.width = across;
-  camera.fx = *focal_px;
-  const double angle_deg = camera.horizontal_fov_deg();
-  if (angle_deg >= narrowest_deg && angle_deg <= widest_deg) return {};
+  double angle_deg = 0;
+  if (!focal_px || is_of_a_lens(*focal_px, still.size, &angle_deg)) return {};
   return fail(ErrorKind::usage, where,
               fmt::format("a focal length of {:g} px, with which the {} pixels of {} span {:.3g} "
                           "degrees",
-                          *focal_px, across, still.described(), angle_deg),
+                          *focal_px, std::max(still.size.width, still.size.height),
+                          still.described(), angle_deg),
               "give it in pixels: millimetres times the image's width in pixels, by the sensor's "
               "in millimetres");
 }

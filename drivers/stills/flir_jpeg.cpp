@@ -111,6 +111,47 @@ Result<Records> read_directory(std::string_view file, const std::string& where) 
   return records;
 }
 
+/// Where the next file of a recording begins, at `from` or behind it; the end without one. The
+/// magic alone may also occur among samples.
+std::size_t next_file(std::string_view bytes, std::size_t from) {
+  constexpr std::string_view magic_tail("FF\0", 3);  // of either magic
+  for (std::size_t at = bytes.find(magic_tail, from + 1); at != bytes.npos;
+       at = bytes.find(magic_tail, at + 1))
+    if (read_directory(bytes.substr(at - 1), "")) return at - 1;
+  return bytes.size();
+}
+
+/// Where the records of a file of a recording end; nothing where it has no whole image.
+std::optional<std::size_t> end_of_image(std::string_view file) {
+  const auto records = read_directory(file, "");
+  if (!records || !records->by_type.contains(raw_data) || !records->by_type.contains(camera_info))
+    return std::nullopt;
+  std::size_t end = 64;
+  for (const auto& [type, record] : records->by_type)
+    end = std::max(end, static_cast<std::size_t>(record.data() + record.size() - file.data()));
+  return end;
+}
+
+/// Whether a damaged image lies in the bytes between one of `image_size` and the next, or the end:
+/// cameras leave room there, and zeros behind the last.
+bool holds_damaged_image(std::string_view gap, std::size_t image_size, bool at_end) {
+  if (gap.find(fff_magic) != gap.npos || gap.find(aff_magic) != gap.npos) return true;
+  if (at_end && gap.find_first_not_of('\0') == gap.npos) return false;
+  return 2 * gap.size() >= image_size;
+}
+
+/// In as many parts as images of `image_size` (0: unknown) fit there, each of which is named when
+/// it is read.
+void add_damaged(std::string_view bytes, std::size_t image_size,
+                 std::vector<std::string_view>& frames) {
+  const std::size_t fitting = image_size == 0 ? 1 : (bytes.size() + image_size / 2) / image_size;
+  const std::size_t parts = std::clamp<std::size_t>(fitting, 1, 1000);
+  for (std::size_t i = 0; i < parts; ++i) {
+    const std::size_t begin = bytes.size() * i / parts;
+    frames.push_back(bytes.substr(begin, bytes.size() * (i + 1) / parts - begin));
+  }
+}
+
 /// RawData and CameraInfo begin with a 2 in their own byte order.
 Order record_order(std::string_view record) {
   return Block(record, Order::little).u16(0) == 2 ? Order::little : Order::big;
@@ -150,6 +191,9 @@ void read_camera_info(std::string_view record, FlirImage& image) {
     const std::int64_t milliseconds = info.u32(0x388) & 0xffff;
     image.taken_ns =
         seconds * 1'000'000'000LL + std::min<std::int64_t>(milliseconds, 999) * 1'000'000LL;
+    // Minutes from local time to UTC.
+    const auto zone = static_cast<std::int16_t>(info.u16(0x38c));
+    if (std::abs(zone) <= 14 * 60) image.utc_offset_s = -60 * zone;
   }
 }
 
@@ -232,19 +276,25 @@ bool is_flir_recording(std::string_view bytes) {
 
 std::vector<std::string_view> flir_recording_frames(std::string_view bytes) {
   std::vector<std::string_view> frames;
-  std::size_t at = is_flir_recording(bytes) ? 0 : std::string_view::npos;
-  while (at != std::string_view::npos && frames.size() < max_recording_frames) {
+  if (!is_flir_recording(bytes)) return frames;
+  std::size_t image_size = 0;  // of the last whole one
+  for (std::size_t at = 0; at < bytes.size() && frames.size() < max_recording_frames;) {
     const std::string_view rest = bytes.substr(at);
-    const auto records = read_directory(rest, "");
-    if (!records) break;
-    // The magic may also occur among samples: look for the next frame behind all records of this
-    // one.
-    std::size_t end = 64;
-    for (const auto& [type, record] : records->by_type)
-      end = std::max(end, static_cast<std::size_t>(record.data() + record.size() - rest.data()));
-    const std::size_t next = std::min(rest.find(fff_magic, end), rest.find(aff_magic, end));
-    frames.push_back(rest.substr(0, next));
-    at = next == std::string_view::npos ? next : at + next;
+    std::optional<std::size_t> end = end_of_image(rest);
+    // A record that is too long would swallow the images behind its own.
+    const bool joins = end && read_directory(rest.substr(*end), "");
+    const std::string_view file = rest.substr(0, joins ? *end : next_file(rest, 64));
+    at += file.size();
+    if (!joins) end = end_of_image(file);
+    if (!end) {
+      add_damaged(file, image_size, frames);
+      continue;
+    }
+    image_size = *end;
+    const std::string_view gap = file.substr(*end);
+    const bool damaged = !gap.empty() && holds_damaged_image(gap, image_size, at == bytes.size());
+    frames.push_back(damaged ? file.substr(0, *end) : file);
+    if (damaged) add_damaged(gap, image_size, frames);
   }
   return frames;
 }

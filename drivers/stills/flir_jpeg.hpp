@@ -24,6 +24,7 @@ struct FlirImage {
   std::string camera_model, camera_serial;
   std::optional<double> horizontal_fov_deg;
   std::optional<std::int64_t> taken_ns;  ///< UTC
+  int utc_offset_s = 0;                  ///< the camera's local time less UTC
   std::string embedded_visible;          ///< JPEG or PNG file, empty if absent
 };
 
@@ -39,7 +40,8 @@ Result<FlirImage> read_flir_jpeg(std::string_view bytes, const std::string& wher
 /// A file that begins with a FLIR header: one image (FFF) or a recording (SEQ, and CSQ, which keeps
 /// its samples as JPEG-LS): such files one behind the other.
 bool is_flir_recording(std::string_view bytes);
-/// Its images, in order; what follows a damaged one is not found.
+/// Its images, in order. A damaged one is among them as what is left of it, which read_flir_file()
+/// refuses.
 std::vector<std::string_view> flir_recording_frames(std::string_view bytes);
 /// One of them. `where`, errors and constants as of read_flir_jpeg.
 Result<FlirImage> read_flir_file(std::string_view file, const std::string& where);

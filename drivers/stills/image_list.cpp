@@ -50,8 +50,10 @@ std::pair<std::size_t, std::size_t> digit_run(const std::string& s, std::size_t 
   return {at, end};
 }
 
-/// A Mac leaves "._IMG_1.jpg" beside IMG_1.jpg on cards and sticks: no image, and as one in front
-/// of all others it would shift the stations of those.
+/// What a phone's user deleted (".trashed-...jpg"), and what a Mac leaves beside IMG_1.jpg on cards
+/// and sticks ("._IMG_1.jpg"), which is no image: in front of all others they would shift the
+/// stations of those.
+bool is_hidden(const fs::path& file) { return file.filename().string().starts_with("."); }
 bool is_of_mac(const fs::path& file) { return file.filename().string().starts_with("._"); }
 
 /// A JPEG, PNG or TIFF by its first bytes; those of a BMP begin many a text.
@@ -65,7 +67,7 @@ bool begins_like_an_image(const fs::path& file) {
 bool holds_images(Modality modality, const fs::path& folder) {
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error))
-    if (entry.is_regular_file(error) && !is_of_mac(entry.path()) &&
+    if (entry.is_regular_file(error) && !is_hidden(entry.path()) &&
         has_image_extension(modality, entry.path()))
       return true;
   return false;
@@ -169,6 +171,10 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
       const bool is_folder = entry.is_directory(error);
       if (is_folder && holds_images(modality, entry.path())) list.folders.push_back(entry.path());
       if (is_folder || is_of_mac(entry.path())) continue;
+      if (is_hidden(entry.path())) {
+        if (has_image_extension(modality, entry.path())) list.hidden.push_back(entry.path());
+        continue;
+      }
       if (!entry.is_regular_file(error)) {
         if (has_image_extension(modality, entry.path())) list.no_files.push_back(entry.path());
         continue;
@@ -211,6 +217,7 @@ Result<ImageList> list_images(Modality modality, const std::vector<fs::path>& pa
   });
   std::sort(list.unread.begin(), list.unread.end());
   std::sort(list.nameless.begin(), list.nameless.end());
+  std::sort(list.hidden.begin(), list.hidden.end());
   std::sort(list.no_files.begin(), list.no_files.end());
   std::sort(list.videos_among_photos.begin(), list.videos_among_photos.end());
   return list;

@@ -19,6 +19,8 @@ struct ImageList {
   std::vector<std::filesystem::path> nameless;
   /// Named like images, but nothing that could be read: links to nothing, pipes, devices.
   std::vector<std::filesystem::path> no_files;
+  /// Their names begin with a dot: deleted ones of a phone. Without those that a Mac leaves.
+  std::vector<std::filesystem::path> hidden;
   /// In a folder that also holds photos: they may be parts of those (Live Photos), so they are
   /// taken only where they are named, or from a folder of videos alone.
   std::vector<std::filesystem::path> videos_among_photos;
@@ -29,7 +31,7 @@ struct ImageList {
 };
 
 /// Image files named by the paths: files as given, folders without their sub-folders. In natural
-/// name order ("9.jpg" before "10.jpg"), without those that a Mac leaves ("._9.jpg"). FLIR
+/// name order ("9.jpg" before "10.jpg"), of folders without hidden ones (".9.jpg"). FLIR
 /// recordings are thermal images, videos and HEIC visible ones. Input error when a path is missing
 /// or has no images.
 Result<ImageList> list_images(Modality modality, const std::vector<std::filesystem::path>& paths);

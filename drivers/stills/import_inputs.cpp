@@ -54,6 +54,8 @@ class Gathering {
     ORBITFUSE_TRY(check_roles());
     take_out_copies(Modality::visible, {&inputs_.visible, &inputs_.visible_tracking});
     take_out_copies(Modality::thermal, {&inputs_.thermal, &inputs_.thermal_tracking});
+    to_one_clock(
+        {&inputs_.visible, &inputs_.visible_tracking, &inputs_.thermal, &inputs_.thermal_tracking});
     for (std::vector<Source>* sources :
          {&inputs_.visible, &inputs_.visible_tracking, &inputs_.thermal, &inputs_.thermal_tracking})
       *sources = in_capture_order(std::move(*sources));
@@ -85,6 +87,10 @@ class Gathering {
     for (const fs::path& file : list.nameless) {
       remarks_.left_out(file.string(),
                         "an image whose name has no extension; rename it (.jpg, .png, .tiff)");
+    }
+    for (const fs::path& file : list.hidden) {
+      remarks_.left_out(file.string(),
+                        "a hidden file (deleted? Its name begins with a dot); name it to take it");
     }
     for (const auto& [link, file] : list.links) {
       remarks_.left_out(link.string(), "the same image as " + file.filename().string(), "a link");
@@ -204,9 +210,11 @@ class Gathering {
       source.pages = thermal_page_count(*bytes);
       for (source.page = 0; source.page < source.pages; ++source.page) {
         source.taken_ns.reset();
+        source.utc_offset_s.reset();
         if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
           decoder_.observe(*thermal, source.short_name());
           source.taken_ns = thermal->taken_ns;
+          source.utc_offset_s = thermal->utc_offset_s;
         }
         sources.push_back(source);
       }
@@ -217,10 +225,12 @@ class Gathering {
   /// A thermal camera's folder holds both: what its radiometric JPEGs show are temperatures.
   std::vector<Source> photos_alone(std::vector<Source> sources) {
     std::erase_if(sources, [&](const Source& source) {
-      if (!source.radiometric) return false;
-      remarks_.left_out(source.file.string(),
-                        "a thermal image, not a photo (give it with --thermal; --embedded-visible "
-                        "takes the photo inside)");
+      if (!source.thermal_kind) return false;
+      const bool has_photo_inside = std::string(source.thermal_kind) == "FLIR";
+      remarks_.left_out(
+          source.file.string(),
+          fmt::format("a thermal image, not a photo (give it with --thermal{})",
+                      has_photo_inside ? "; --embedded-visible takes the photo inside" : ""));
       return true;
     });
     return sources;

@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "core/system/file_io.hpp"
-#include "drivers/stills/flir_jpeg.hpp"
 #include "drivers/stills/still_photo.hpp"
 #include "drivers/stills/video_frames.hpp"
 
@@ -36,12 +35,25 @@ std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& file
     const Result<std::string> bytes = read_file(file, max_image_bytes);
     if (bytes) {
       source.hash = content_hash(*bytes);
-      source.taken_ns = exif_of_photo(*bytes).taken_ns;
-      source.radiometric = is_flir_jpeg(*bytes);
+      const ExifInfo exif = exif_of_photo(*bytes);
+      source.taken_ns = exif.taken_ns;
+      if (exif.taken_has_offset) source.utc_offset_s = exif.utc_offset_s;
+      source.thermal_kind = thermal_jpeg_kind(*bytes);
     }
     sources.push_back(std::move(source));
   }
   return sources;
+}
+
+void to_one_clock(std::initializer_list<std::vector<Source>*> lists) {
+  const bool all_tell = std::all_of(lists.begin(), lists.end(), [](const auto* sources) {
+    return std::all_of(sources->begin(), sources->end(),
+                       [](const Source& s) { return !s.taken_ns || s.utc_offset_s; });
+  });
+  if (all_tell) return;
+  for (std::vector<Source>* sources : lists)
+    for (Source& source : *sources)
+      if (source.taken_ns) *source.taken_ns += source.utc_offset_s.value_or(0) * 1'000'000'000LL;
 }
 
 std::vector<Source> in_capture_order(std::vector<Source> sources) {

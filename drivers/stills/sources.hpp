@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
 #include <map>
 #include <optional>
 #include <string>
@@ -17,10 +18,11 @@ namespace orbitfuse {
 struct Source {
   std::filesystem::path file;
   int page = 0, pages = 1;
-  bool video = false;        ///< some of its frames become images
-  bool radiometric = false;  ///< a radiometric JPEG among photos
-  std::string hash;          ///< of the file's bytes; empty: it can't be read
+  bool video = false;                  ///< some of its frames become images
+  const char* thermal_kind = nullptr;  ///< of a thermal camera's JPEG among photos: "FLIR", "DJI"
+  std::string hash;                    ///< of the file's bytes; empty: it can't be read
   std::optional<std::int64_t> taken_ns;
+  std::optional<std::int64_t> utc_offset_s;  ///< local time less UTC, where the file tells it
   int position = 0;  ///< in capture order, counting files that turn out unreadable
 
   /// Folder and file: enough to tell "visible/000.jpg" from "thermal/000.jpg" on any machine.
@@ -31,6 +33,10 @@ struct Source {
 
 /// Photos and videos with the times that they name themselves.
 std::vector<Source> photo_sources(const std::vector<std::filesystem::path>& files);
+
+/// Leaves the times as they are, UTC, where every file that has one tells its offset; else all
+/// become local times: a photo without an offset can be compared with others only so.
+void to_one_clock(std::initializer_list<std::vector<Source>*> lists);
 
 /// Capture order: by time where every file has one (file name breaks ties of one-second clocks),
 /// else by name. Sets the positions.

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "core/image/exif.hpp"
 #include "core/image/transparency.hpp"
@@ -47,10 +49,36 @@ bool lies_across(cv::Size photo, const ThermalFile& file) {
   return shape(photo) * shape(samples) < 0;  // neither is square
 }
 
+/// FLIR's photos that are PNGs hold luma and the two colour differences where PNG has red, green
+/// and blue.
+cv::Mat bgr_of_flir_png(const cv::Mat& image) {
+  constexpr int from_to[] = {2, 0, 0, 1, 1, 2};  // of Cr, Cb, Y to Y, Cr, Cb
+  cv::Mat ordered(image.size(), image.type()), out;
+  cv::mixChannels(&image, 1, &ordered, 1, from_to, 3);
+  cv::cvtColor(ordered, out, cv::COLOR_YCrCb2BGR);
+  return out;
+}
+
+/// Nothing where EXIF tells none, or one that no lens has (4 mm, 4000 mm): it would be believed.
+std::optional<double> believed_35mm(const ExifInfo& exif, cv::Size size) {
+  const bool good = exif.focal_35mm && is_of_a_lens(focal_px_of_35mm(*exif.focal_35mm, size), size);
+  return good ? exif.focal_35mm : std::nullopt;
+}
+
 }  // namespace
 
 double focal_px_of_35mm(double focal_35mm, cv::Size size) {
   return focal_35mm * std::hypot(size.width, size.height) / full_frame_diagonal_mm;
+}
+
+bool is_of_a_lens(double focal_px, cv::Size size, double* angle_deg) {
+  constexpr double narrowest_deg = 1.5, widest_deg = 130;
+  Camera camera;
+  camera.width = std::max(size.width, size.height);
+  camera.fx = focal_px;
+  const double angle = camera.horizontal_fov_deg();
+  if (angle_deg) *angle_deg = angle;
+  return angle >= narrowest_deg && angle <= widest_deg;
 }
 
 ExifInfo exif_of_photo(std::string_view bytes) {
@@ -71,6 +99,11 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where,
     if (image_format(bytes) == ImageFormat::tiff) still.other_pages = other_tiff_pages(bytes);
   }
   ORBITFUSE_TRY(check_frame_size(image.size(), where));
+  if (inside && inside->flir && image_format(bytes) == ImageFormat::png &&
+      image.type() == CV_8UC3) {
+    image = bgr_of_flir_png(image);
+    ORBITFUSE_ASSIGN(bytes, encode_png(image));
+  }
   // Before it counts as a camera of its own.
   if (image.depth() != CV_8U)
     return fail(ErrorKind::input, where,
@@ -92,10 +125,11 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where,
   still.camera.driver = "stills";
   still.camera.model = exif.make.empty() ? exif.model : exif.make + " " + exif.model;
   still.camera.serial = exif.serial;
-  if (exif.focal_35mm) still.camera.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, still.size);
+  const std::optional<double> equivalent_mm = believed_35mm(exif, still.size);
+  if (equivalent_mm) still.camera.lens.focal_px = focal_px_of_35mm(*equivalent_mm, still.size);
   still.lens = exif.focal_mm ? fmt::format("{:g} mm", *exif.focal_mm) : "";
   // A digital zoom changes only the equivalent.
-  if (exif.focal_35mm) still.lens += fmt::format(" (35 mm: {:g} mm)", *exif.focal_35mm);
+  if (equivalent_mm) still.lens += fmt::format(" (35 mm: {:g} mm)", *equivalent_mm);
   return still;
 }
 
@@ -144,8 +178,8 @@ Result<StillPhoto> thermal_still(const ThermalFile& file, const ThermalDecoder& 
     still.camera.model = exif.model.empty() ? exif.make : exif.make + " " + exif.model;
     still.camera.serial = exif.serial;
     if (exif.focal_mm) still.lens = fmt::format("{:g} mm", *exif.focal_mm);
-    if (exif.focal_35mm)
-      still.camera.lens.focal_px = focal_px_of_35mm(*exif.focal_35mm, still.size);
+    if (const auto equivalent_mm = believed_35mm(exif, still.size))
+      still.camera.lens.focal_px = focal_px_of_35mm(*equivalent_mm, still.size);
   }
   if (file.flir) {
     still.camera.model = file.flir->camera_model;
@@ -194,9 +228,14 @@ std::string StillPhoto::described() const {
          fmt::format(", {}x{}{}", size.width, size.height, frame.thermal_is_gray ? ", grey" : "");
 }
 
+const char* thermal_jpeg_kind(std::string_view bytes) {
+  if (is_flir_jpeg(bytes)) return "FLIR";
+  return is_dji_thermal(bytes) ? "DJI" : nullptr;
+}
+
 bool is_radiometric(const std::filesystem::path& file) {
   const Result<std::string> bytes = read_file(file, max_image_bytes);
-  return bytes && is_flir_jpeg(*bytes);
+  return bytes && thermal_jpeg_kind(*bytes) != nullptr;
 }
 
 }  // namespace orbitfuse

@@ -34,6 +34,10 @@ struct StillPhoto {
 /// Size of the upright image at 35 mm equivalent focal length, in pixels.
 double focal_px_of_35mm(double focal_35mm, cv::Size size);
 
+/// Whether a lens may have that focal length: an image of that size spans 1.5 to 130 degrees along
+/// its longer side, `angle_deg`.
+bool is_of_a_lens(double focal_px, cv::Size size, double* angle_deg = nullptr);
+
 /// What a photo of any format that is read says of itself. Never fails.
 ExifInfo exif_of_photo(std::string_view bytes);
 
@@ -56,7 +60,10 @@ Result<StillPhoto> read_visible_still(const std::filesystem::path& file);
 /// As above; `decoder` gets to see 16-bit samples of unknown scale first.
 Result<StillPhoto> read_thermal_still(const std::filesystem::path& file, ThermalDecoder& decoder);
 
-/// Whether the file is a radiometric JPEG; false also when it can't be read.
+/// "FLIR" or "DJI" of a JPEG that holds what a thermal camera measured, else null.
+const char* thermal_jpeg_kind(std::string_view bytes);
+
+/// Whether the file is such a JPEG; false also when it can't be read.
 bool is_radiometric(const std::filesystem::path& file);
 
 }  // namespace orbitfuse

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 #include "core/image/has_colors.hpp"
+#include "core/image/image_io.hpp"
 #include "core/temperature.hpp"
 
 namespace orbitfuse {
@@ -50,18 +53,21 @@ bool is_plausible(const CountHistogram& histogram, ThermalScaleTag scale) {
   return kelvin_of(percentile(histogram, 5), scale) >= coldest_plausible_k;
 }
 
-tl::unexpected<Error> too_cold_floats(const ThermalFile& file, const std::string& where,
-                                      const CountHistogram& histogram) {
+tl::unexpected<Error> bad_floats(const std::string& where, const std::string& found) {
   return fail(
-      ErrorKind::input, where,
-      fmt::format("32-bit floats, read as {}: their cold part would be {:.0f} C", file.float_unit,
-                  celsius_from_kelvin(kelvin_of(percentile(histogram, 5), *file.tag))),
-      "store 100 x kelvin as 16-bit, or NaN where there is no temperature");
+      ErrorKind::input, where, "32-bit floats" + found,
+      "store kelvin or Celsius and name it in a tag or sidecar ({\"unit\": \"kelvin\"}), with "
+      "NaN where there is no temperature, or 100 x kelvin as 16-bit (0 where there is none)");
 }
 
-tl::unexpected<Error> too_cold(const std::string& where, const CountHistogram& histogram,
-                               ThermalScaleTag scale) {
-  const double coldest_k = kelvin_of(percentile(histogram, 5), scale);
+/// Of floats with a scale.
+cv::Mat kelvin_of_floats(const cv::Mat& values, ThermalScaleTag scale) {
+  cv::Mat kelvin;
+  values.convertTo(kelvin, CV_32F, scale.scale, scale.offset);
+  return kelvin;
+}
+
+tl::unexpected<Error> too_cold(const std::string& where, double coldest_k, ThermalScaleTag scale) {
   return fail(
       ErrorKind::input, where,
       fmt::format(
@@ -88,14 +94,14 @@ std::string words_of(const std::optional<DjiParameters>& set) {
 }  // namespace
 
 std::optional<ThermalScaleTag> ThermalDecoder::scale_of(const ThermalFile& file) const {
-  if (file.float_unit) return file.tag;  // it has no counts of its own
+  const bool has_counts = file.kind != ThermalFile::Kind::floats;
   switch (options_.thermal_scale) {
     case ThermalScale::linear:
       return ThermalScaleTag{options_.kelvin_per_count, options_.kelvin_offset};
     case ThermalScale::centikelvin:
-      return ThermalScaleTag{};
+      return has_counts ? ThermalScaleTag{} : file.tag;
     case ThermalScale::raw_counts:
-      return std::nullopt;
+      return has_counts ? std::nullopt : file.tag;
     case ThermalScale::automatic:
       break;
   }
@@ -104,8 +110,11 @@ std::optional<ThermalScaleTag> ThermalDecoder::scale_of(const ThermalFile& file)
 
 void ThermalDecoder::observe(const ThermalFile& file, const std::string& where) {
   ++files_;
+  without_counts_ +=
+      file.kind == ThermalFile::Kind::radiometric_jpeg || file.kind == ThermalFile::Kind::gray8;
   if (file.kind == ThermalFile::Kind::radiometric_jpeg) observe_jpeg(*file.flir);
   if (file.kind == ThermalFile::Kind::samples16) observe_samples(file, where);
+  if (file.kind == ThermalFile::Kind::floats) observe_floats(file, where);
   if (file.kind == ThermalFile::Kind::gray8 && has_colors(file.image)) colored_.push_back(where);
 }
 
@@ -127,11 +136,25 @@ void ThermalDecoder::observe_jpeg(const FlirImage& image) {
   }
 }
 
+void ThermalDecoder::observe_floats(const ThermalFile& file, const std::string& where) {
+  const auto scale = scale_of(file);
+  without_counts_ += options_.thermal_scale != ThermalScale::linear;
+  const auto summary = summary_of(scale ? kelvin_of_floats(file.image, *scale) : file.image);
+  if (!summary) return;  // convert() says so
+  if (!scale && !file.unit) {
+    floats_.observe(*summary, file.image.size(), where);
+    return;
+  }
+  const FloatUnit unit = scale ? FloatUnit::kelvin : *file.unit;
+  if (summary->cold_k(unit) < coldest_plausible_k) return;
+  ++with_scale_;
+  hottest_k_ = std::max(hottest_k_, summary->hottest_k[static_cast<std::size_t>(unit)]);
+  if (summary->middle_k(unit) > glowing_k) glowing_.push_back(where);
+}
+
 void ThermalDecoder::observe_samples(const ThermalFile& file, const std::string& where) {
   CountHistogram histogram = histogram_of(file.image);
   histogram.back() = 0;
-  if (file.float_unit) floats_[file.float_unit].push_back(where);
-  samples16_ += file.float_unit == nullptr;
   const auto scale = scale_of(file);
   if (scale) {
     if (!is_plausible(histogram, *scale)) return;  // convert() says so
@@ -158,12 +181,16 @@ bool ThermalDecoder::samples_are_raw_counts() const {
 }
 
 bool ThermalDecoder::has_temperatures() const {
-  return radiometric_jpegs_ + with_scale_ > 0 ||
+  return radiometric_jpegs_ + with_scale_ > 0 || floats_.hottest_k(coldest_plausible_k) > 0 ||
          (like_centikelvin_ > 0 && !samples_are_raw_counts());
 }
 
+double ThermalDecoder::hottest_k() const {
+  return std::max(hottest_k_, floats_.hottest_k(coldest_plausible_k));
+}
+
 double ThermalDecoder::kelvin_per_count() const {
-  return std::max(least_kelvin_per_count_, kelvin_per_count_for(hottest_k_));
+  return std::max(least_kelvin_per_count_, kelvin_per_count_for(hottest_k()));
 }
 
 void ThermalDecoder::store_no_finer_than(double kelvin_per_count) {
@@ -171,11 +198,7 @@ void ThermalDecoder::store_no_finer_than(double kelvin_per_count) {
 }
 
 void ThermalDecoder::tell_guesses(std::vector<std::string>& list) const {
-  for (const auto& [unit, files] : floats_) {
-    list.push_back(
-        fmt::format("{}{}: 32-bit floats, read as {}", files.front(),
-                    files.size() == 1 ? "" : fmt::format(" and {} more", files.size() - 1), unit));
-  }
+  for (std::string& words : floats_.told()) list.push_back(std::move(words));
   const double median_c = celsius_from_kelvin(kelvin_of(percentile(centikelvin_, 50), {}));
   if (like_centikelvin_ > 0 && !samples_are_raw_counts() && !(median_c >= -40 && median_c <= 150)) {
     list.push_back(fmt::format(
@@ -184,11 +207,13 @@ void ThermalDecoder::tell_guesses(std::vector<std::string>& list) const {
         "give --thermal-scale linear with --kelvin-per-count and --kelvin-offset, or raw",
         median_c));
   }
-  if (options_.thermal_scale != ThermalScale::automatic && samples16_ < files_) {
+  if (options_.thermal_scale != ThermalScale::automatic && without_counts_ > 0) {
+    const bool is_linear = options_.thermal_scale == ThermalScale::linear;
     list.push_back(fmt::format(
-        "--thermal-scale is for 16-bit samples and changes nothing in {} of {} thermal files "
-        "(8-bit, 32-bit float or radiometric JPEG)",
-        files_ - samples16_, files_));
+        "--thermal-scale{} is for 16-bit samples{} and changes nothing in {} of {} thermal files "
+        "(8-bit, {}or radiometric JPEG)",
+        is_linear ? " linear" : "", is_linear ? " and 32-bit floats" : "", without_counts_, files_,
+        is_linear ? "" : "32-bit float "));
   }
 }
 
@@ -199,7 +224,7 @@ std::vector<std::string> ThermalDecoder::remarks() const {
     list.push_back(fmt::format(
         "the hottest sample is {:.0f} C, so thermal files hold {:g} K a count, not {:g}; their "
         "tag says so",
-        celsius_from_kelvin(hottest_k_), kelvin_per_count(), kelvin_per_dn));
+        celsius_from_kelvin(hottest_k()), kelvin_per_count(), kelvin_per_dn));
   }
   if (dji_ > 0) {
     list.push_back(fmt::format(
@@ -222,11 +247,13 @@ std::vector<std::string> ThermalDecoder::remarks() const {
         colored_.size() == 1 ? ""
                              : fmt::format(" and {} more thermal files", colored_.size() - 1)));
   }
-  if (!glowing_.empty()) {
+  std::vector<std::string> glowing = glowing_;
+  for (std::string& file : floats_.hotter_than(glowing_k)) glowing.push_back(std::move(file));
+  if (!glowing.empty()) {
     list.push_back(fmt::format(
         "half of {} ({} such files) is hotter than 500 C: if it is no furnace, its scale is wrong "
         "(--thermal-scale centikelvin, or linear with --kelvin-per-count)",
-        glowing_.front(), glowing_.size()));
+        glowing.front(), glowing.size()));
   }
   return list;
 }
@@ -244,6 +271,7 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert(const ThermalFile& fil
     return out;
   }
   if (file.kind == ThermalFile::Kind::samples16) return convert_samples(file, where);
+  if (file.kind == ThermalFile::Kind::floats) return convert_floats(file, where);
   FlirCalibration calibration = file.flir->calibration;
   calibration.object = with_overrides(calibration.object, options_.object);
   ORBITFUSE_TRY(calibration.validate(where));
@@ -261,8 +289,7 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalF
   std::optional<ThermalScaleTag> scale = scale_of(file);
   const CountHistogram histogram = histogram_of(file.image);
   if (scale && !is_plausible(histogram, *scale))
-    return file.float_unit ? too_cold_floats(file, where, histogram)
-                           : too_cold(where, histogram, *scale);
+    return too_cold(where, kelvin_of(percentile(histogram, 5), *scale), *scale);
   if (!scale && !has_temperatures()) return stretched(file.image);
   if (!scale && (file.dji || samples_are_raw_counts() || !is_plausible(histogram, {}))) {
     return fail(ErrorKind::input, where,
@@ -274,6 +301,38 @@ Result<ThermalDecoder::Converted> ThermalDecoder::convert_samples(const ThermalF
   for (std::size_t dn = 1; dn + 1 < kelvin.size(); ++dn)
     kelvin[dn] = kelvin_of(static_cast<double>(dn), tag);
   return stored(file.image, kelvin, where);
+}
+
+Result<ThermalDecoder::Converted> ThermalDecoder::convert_floats(const ThermalFile& file,
+                                                                 const std::string& where) const {
+  const auto scale = scale_of(file);
+  const bool is_guess = !scale && !file.unit;
+  const FloatUnit unit = scale      ? FloatUnit::kelvin
+                         : is_guess ? floats_.unit_of(file.image.size())
+                                    : *file.unit;
+  const cv::Mat values = scale ? kelvin_of_floats(file.image, *scale) : file.image;
+  const auto summary = summary_of(values);
+  if (!summary) return bad_floats(where, " without one temperature");
+  if (is_guess && !is_kelvin_or_celsius(*summary))
+    return bad_floats(
+        where, fmt::format(" with a median of {:g}: neither kelvin nor Celsius", summary->middle));
+  const double coldest_k = summary->cold_k(unit);
+  if (coldest_k < coldest_plausible_k && scale) return too_cold(where, coldest_k, *scale);
+  if (coldest_k < coldest_plausible_k)
+    return bad_floats(where, fmt::format(", read as {}: their cold part would be {:.0f} C",
+                                         name(unit), celsius_from_kelvin(coldest_k)));
+  const cv::Mat kelvin = kelvin_of_floats(values, unit);
+  Converted out;
+  out.kelvin_per_count = kelvin_per_count();
+  out.counts = counts_of_kelvin(kelvin, out.kelvin_per_count);
+  // NaN, infinity and what is below 0 K were no samples before either.
+  cv::Mat numbers;
+  cv::inRange(kelvin, std::numeric_limits<float>::min(), std::numeric_limits<float>::max(),
+              numbers);
+  out.without_temperature = cv::countNonZero(numbers & (out.counts == 0));
+  if (cv::countNonZero(out.counts) == 0)
+    return bad_floats(where, " without a temperature that can be stored");
+  return out;
 }
 
 ThermalDecoder::Converted ThermalDecoder::stretched(const cv::Mat& counts) const {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <set>
@@ -56,17 +55,20 @@ class ThermalDecoder {
  private:
   std::optional<ThermalScaleTag> scale_of(const ThermalFile& file) const;
   void observe_jpeg(const FlirImage& image);
+  void observe_floats(const ThermalFile& file, const std::string& where);
   void observe_samples(const ThermalFile& file, const std::string& where);
   void tell_guesses(std::vector<std::string>& list) const;
+  double hottest_k() const;
   Result<Converted> convert_samples(const ThermalFile& file, const std::string& where) const;
+  Result<Converted> convert_floats(const ThermalFile& file, const std::string& where) const;
   Converted stretched(const cv::Mat& counts) const;
   Result<Converted> stored(const cv::Mat& counts, const std::vector<double>& kelvin,
                            const std::string& where) const;
 
   const ImportOptions& options_;
   int files_ = 0, radiometric_jpegs_ = 0, with_scale_ = 0;
-  int samples16_ = 0;  ///< files that a scale of the user's is for
-  std::map<std::string, std::vector<std::string>> floats_;  ///< files of floats, by their unit
+  int without_counts_ = 0;                ///< files that a scale of the user's is not for
+  FloatUnits floats_;                     ///< those whose unit nothing states
   int dji_ = 0;                           ///< files of DJI drones whose counts nobody gave a scale
   std::set<std::string> dji_parameters_;  ///< what their operators set for temperatures, in words
   int like_centikelvin_ = 0, like_counts_ = 0;  ///< 16-bit files without a scale

@@ -8,9 +8,10 @@
 
 #include "core/image/exif.hpp"
 #include "core/image/jpeg_size.hpp"
+#include "core/image/temperature_unit.hpp"
 #include "core/image/transparency.hpp"
 #include "core/system/file_io.hpp"
-#include "drivers/stills/float_temperatures.hpp"
+#include "core/temperature.hpp"
 
 namespace orbitfuse {
 namespace {
@@ -50,6 +51,68 @@ void turn_upright(FlirImage& flir, std::string_view jpeg, ThermalFile& file) {
   flir.signal = apply_orientation(flir.signal, file.orientation);
 }
 
+void take_time(ThermalFile& file, const ExifInfo& exif) {
+  file.taken_ns = exif.taken_ns;
+  if (exif.taken_has_offset) file.utc_offset_s = exif.utc_offset_s;
+}
+
+/// What the text, of the file or its sidecar, says of a unit where it names no scale.
+Status read_unit(ThermalFile& file, std::string_view text, const std::string& where) {
+  const auto unit = temperature_unit_of(text);
+  if (!unit) return {};
+  const bool are_floats = file.kind == ThermalFile::Kind::floats;
+  if (*unit == TemperatureUnit::other || (!are_floats && *unit == TemperatureUnit::celsius))
+    return fail(ErrorKind::input, where, "a \"unit\" that is not kelvin, and no \"scale\"",
+                "give kelvin = scale * sample + offset, as {\"scale\": 0.01, \"offset\": 273.15} "
+                "for hundredths of a degree Celsius");
+  if (are_floats)
+    file.unit = *unit == TemperatureUnit::kelvin ? FloatUnit::kelvin : FloatUnit::celsius;
+  return {};
+}
+
+Status read_sidecar(ThermalFile& file, const std::filesystem::path& sidecar) {
+  ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
+  const std::string where = sidecar.string();
+  const auto beside = thermal_scale_of_sidecar(text, where);
+  if ((file.tag || file.unit) && !beside) {
+    file.two_scales = fmt::format("it has a {} of its own; its sidecar is passed over ({})",
+                                  file.tag ? "scale" : "unit", beside.error().found);
+  } else if (file.tag && differ(*file.tag, *beside)) {
+    file.two_scales = fmt::format(
+        "its own tag says {:g} K a count from {:g} K on, {} {:g} K from {:g} K on, which is passed "
+        "over: delete the one that is wrong",
+        file.tag->scale, file.tag->offset, sidecar.filename().string(), beside->scale,
+        beside->offset);
+  } else if (!file.tag && beside) {
+    file.tag = *beside;
+    if (file.kind == ThermalFile::Kind::floats && says_zero_is_none(text))
+      file.image.setTo(invalid_k, file.image == 0);
+  } else if (!beside) {
+    // Floats need no scale, only a unit.
+    if (thermal_scale_of_description(text, where)) {
+      ORBITFUSE_TRY(read_unit(file, text, where));
+    }
+    if (!file.unit) return tl::unexpected(beside.error());
+  }
+  return {};
+}
+
+/// Of 16-bit samples and floats: the scale or unit of the file's own, else of its sidecar, which of
+/// a DJI file is the user's word.
+Status read_meaning(ThermalFile& file, const std::string& description, const std::string& where) {
+  ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
+  if (file.tag && file.kind == ThermalFile::Kind::floats && says_zero_is_none(description))
+    file.image.setTo(invalid_k, file.image == 0);
+  const Status own_unit = file.tag ? Status{} : read_unit(file, description, where);
+  const std::filesystem::path sidecar = where + ".json";
+  std::error_code ignored;
+  if (std::filesystem::exists(sidecar, ignored)) {
+    ORBITFUSE_TRY(read_sidecar(file, sidecar));
+  }
+  // A scale beside it says how another unit becomes kelvin.
+  return file.tag ? Status{} : own_unit;
+}
+
 }  // namespace
 
 Status check_frame_size(cv::Size size, const std::string& where) {
@@ -83,6 +146,8 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
                      recording ? recorded_image(bytes, where, page) : read_flir_jpeg(bytes, where));
     ORBITFUSE_TRY(check_frame_size(file.flir->signal.size(), where));
     file.taken_ns = file.flir->taken_ns;
+    if (file.taken_ns) file.utc_offset_s = file.flir->utc_offset_s;
+    if (!recording && !file.taken_ns) take_time(file, read_exif(bytes));
     if (!recording) turn_upright(*file.flir, bytes, file);
     return file;
   }
@@ -98,54 +163,31 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
   }
   ORBITFUSE_TRY(check_frame_size(file.image.size(), where));
   const ExifInfo exif = read_exif(bytes);
-  file.taken_ns = exif.taken_ns;
+  take_time(file, exif);
   file.orientation = exif.orientation;
   if (page && image_format(bytes) == ImageFormat::tiff)
     file.orientation = tiff_orientation(bytes, page).value_or(1);
   file.image = apply_orientation(file.image, file.orientation);
   file.transparent = transparent_share(bytes, page);
   if (file.image.depth() == CV_8U) {
+    // Whoever reads thermal frames takes them as they are stored, one image a file.
+    const bool one_of_several = page && thermal_page_count(bytes) > 1;
     file.bytes = bytes;
-    // Whoever reads thermal frames takes them as they are stored.
-    if (file.orientation != 1) {
+    if (file.orientation != 1 || one_of_several) {
       ORBITFUSE_ASSIGN(file.bytes, encode_png(file.image));
     }
     return file;
   }
-  if (file.image.type() == CV_32FC1) {
-    ORBITFUSE_ASSIGN(FloatTemperatures floats, float_temperatures(file.image, where));
-    file.kind = ThermalFile::Kind::samples16;
-    file.image = std::move(floats.counts);
-    file.tag = floats.scale;
-    file.float_unit = floats.unit;
-    return file;
-  }
-  if (file.image.type() != CV_16UC1) {
+  const bool are_floats = file.image.type() == CV_32FC1;
+  if (!are_floats && file.image.type() != CV_16UC1) {
     return fail(
         ErrorKind::input, where,
         fmt::format("{} channels of {} bits", file.image.channels(), 8 * file.image.elemSize1()),
         "thermal images are 16-bit grey (100 x kelvin), float grey, 8-bit or FLIR radiometric "
         "JPEGs");
   }
-  file.kind = ThermalFile::Kind::samples16;
-  ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
-  const std::filesystem::path sidecar = where + ".json";  // also of a DJI file: the user's word
-  std::error_code ignored;
-  if (!std::filesystem::exists(sidecar, ignored)) return file;
-  ORBITFUSE_ASSIGN(const std::string text, read_file(sidecar, max_settings_bytes));
-  const auto beside = thermal_scale_of_sidecar(text, sidecar.string());
-  if (!file.tag && !beside) return tl::unexpected(beside.error());
-  if (!file.tag)
-    file.tag = *beside;
-  else if (!beside)
-    file.two_scales = fmt::format("it has a scale of its own; its sidecar is passed over ({})",
-                                  beside.error().found);
-  else if (differ(*file.tag, *beside))
-    file.two_scales = fmt::format(
-        "its own tag says {:g} K a count from {:g} K on, {} {:g} K from {:g} K on, which is passed "
-        "over: delete the one that is wrong",
-        file.tag->scale, file.tag->offset, sidecar.filename().string(), beside->scale,
-        beside->offset);
+  file.kind = are_floats ? ThermalFile::Kind::floats : ThermalFile::Kind::samples16;
+  ORBITFUSE_TRY(read_meaning(file, description, where));
   return file;
 }
 

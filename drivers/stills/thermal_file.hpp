@@ -12,6 +12,7 @@
 #include "core/result.hpp"
 #include "drivers/stills/dji_jpeg.hpp"
 #include "drivers/stills/flir_jpeg.hpp"
+#include "drivers/stills/float_temperatures.hpp"
 
 namespace orbitfuse {
 
@@ -20,12 +21,14 @@ struct ThermalFile {
   enum class Kind {
     radiometric_jpeg,
     samples16,
+    floats,
     gray8
   };  ///< the first: any image of a FLIR camera
   Kind kind = Kind::gray8;
   std::string bytes;  ///< gray8: the file, or its image turned upright
   std::optional<std::int64_t> taken_ns;
-  cv::Mat image;  ///< samples16: CV_16UC1; gray8: CV_8U
+  std::optional<std::int64_t> utc_offset_s;  ///< of that time, where the file tells it
+  cv::Mat image;  ///< samples16: CV_16UC1; floats: CV_32FC1; gray8: CV_8U
   std::optional<FlirImage> flir;
   std::optional<DjiImage> dji;         ///< samples16: never temperatures unless the user says how
   std::optional<ThermalScaleTag> tag;  ///< from the file or its sidecar
@@ -35,7 +38,7 @@ struct ThermalFile {
   /// As EXIF had it; samples and image here are turned upright by it.
   int orientation = 1;
   bool lies_across = false;  ///< upright beside a broad picture, or the reverse: EXIF can't tell
-  const char* float_unit = nullptr;  ///< samples16 that were floats: what these were taken for
+  std::optional<FloatUnit> unit;  ///< of floats without a tag, where the file or sidecar names it
 };
 
 /// Of a row or a dot of pixels no frame can be made. Input error.

@@ -11,6 +11,8 @@
 
 namespace orbitfuse::measurement {
 
+inline constexpr double sigmas_of_90_percent = 1.645;
+
 inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 /// What one original frame says of a spot or region. Kelvin; of a spot mean = min = max.

@@ -330,11 +330,10 @@ Result<Answer> measure_distance(const ThermalScene& scene, const Request& reques
   answer.distance = (a.position - b.position).norm();
   answer.ends = {a.position, b.position};
   answer.position = 0.5 * (a.position + b.position);
-  constexpr double of_90_percent = 1.645;  // standard deviations
   if (scene.metres_per_unit()) {
     answer.distance_m = answer.distance * *scene.metres_per_unit();
     answer.distance_uncertainty_m =
-        of_90_percent * scene.scale_relative_sigma() * *answer.distance_m;
+        sigmas_of_90_percent * scene.scale_relative_sigma() * *answer.distance_m;
   } else
     answer.notes.emplace_back("no scale: the run doesn't know its unit in metres");
   return answer;

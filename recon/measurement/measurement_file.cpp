@@ -10,6 +10,7 @@
 #include "core/system/file_io.hpp"
 #include "core/system/folder_change_lock.hpp"
 #include "core/system/utc_now.hpp"
+#include "recon/measurement/answer.hpp"
 
 namespace orbitfuse::measurement {
 namespace {
@@ -173,6 +174,20 @@ Result<Measurements> load_measurements(const std::filesystem::path& file,
     result.list.push_back(std::move(saved));
   }
   return result;
+}
+
+void bring_to_scale(Measurements& saved, std::optional<double> metres_per_unit,
+                    double relative_sigma) {
+  for (SavedMeasurement& m : saved.list) {
+    if (m.request.kind != Kind::distance || !m.answer.is_object()) continue;
+    const auto units = m.answer.find("distance");
+    if (units == m.answer.end() || !units->is_number()) continue;
+    m.answer["distance_m"] = m.answer["distance_uncertainty_m"] = json();
+    if (!metres_per_unit) continue;
+    const double metres = units->get<double>() * *metres_per_unit;
+    m.answer["distance_m"] = metres;
+    m.answer["distance_uncertainty_m"] = sigmas_of_90_percent * relative_sigma * metres;
+  }
 }
 
 Result<Kept> add_measurement(const std::filesystem::path& file, const std::string& identity,

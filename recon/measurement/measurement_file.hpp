@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -61,6 +62,10 @@ struct Measurements {
 /// another run (`identity` differs): the file is left as it is.
 Result<Measurements> load_measurements(const std::filesystem::path& file,
                                        const std::string& identity);
+/// Saved distances in the metres that a unit of the run is now: its scale may have been told anew
+/// since. None: without metres.
+void bring_to_scale(Measurements& saved, std::optional<double> metres_per_unit,
+                    double relative_sigma);
 /// Loads, puts (Measurements::put) and saves, as one step: programs that do so at once wait for
 /// each other. `created` is set to now where it is empty. Errors: both's, and check_name's.
 Result<Kept> add_measurement(const std::filesystem::path& file, const std::string& identity,

@@ -109,8 +109,11 @@ double object_radius(const ThermalScene::Middle& middle) { return object_reach *
 Result<std::vector<SurfacePoint>> box_samples(const ThermalScene& scene, const OrientedBox& box,
                                               const Progress& progress) {
   const Eigen::Quaterniond box_from_world = box.rotation.normalized().conjugate();
+  // A box may reach far beyond what is in it; its cells must not grow with it.
+  double side = box.size.maxCoeff();
+  if (scene.middle()) side = std::min(side, 2 * object_radius(*scene.middle()));
   return seen_in(
-      scene, box.size.maxCoeff() / box_cells,
+      scene, side / box_cells,
       [&](const Eigen::Vector3d& p) {
         const Eigen::Vector3d in_box = box_from_world * (p - box.center);
         return (in_box.array().abs() <= 0.5 * box.size.array()).all();

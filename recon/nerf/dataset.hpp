@@ -35,6 +35,8 @@ struct Dataset {
   /// Thermal samples are 8-bit intensities, not temperatures. Each view may have been made by a
   /// curve of its own (training/gray_curves.hpp).
   bool thermal_is_gray = false;
+  /// Of these: they are raw counts of one sensor, of one scale in all views but for its drift.
+  bool counts = false;
   std::vector<TrainingView> views;
   std::vector<SparsePoint> points;  ///< optional; Observation::view indexes `views`
   std::vector<DepthMap> depth;      ///< optional; DepthMap::view indexes `views`

@@ -41,7 +41,9 @@ struct PoseOptions {
   int max_image_side_px = 800;
   /// SIFT features per view, for the same reason.
   int max_features = 3000;
-  /// Below this share of posed views an attempt does not hold and the next one is tried.
+  /// Below this share of posed views an attempt does not hold and the next one is tried. Of photos
+  /// seven tenths have to do where no attempt finds more and stations confirm them, unless more
+  /// than the default are asked for.
   double min_posed_ratio = 0.8;
   /// Root mean square reprojection error above which a COLMAP model is not believed.
   double max_reprojection_rms_px = 2.0;

@@ -96,6 +96,7 @@ void TrainingRun::even_levels(const Field* guide) {
   const auto skip = [&](std::string why) {
     report_.skips.push_back({"even levels", std::move(why), "images are used as they are"});
   };
+  if (data_.dataset.counts) return skip("raw counts of one sensor have one scale");
   if (!options_.shared_geometry)
     return skip("no visible field in the same frame says which points views share");
   const GrayCurves found = estimate_gray_curves(
@@ -117,7 +118,12 @@ void TrainingRun::even_levels(const Field* guide) {
   GrayCurve turned;
   for (std::size_t k = 0; k < turned.size(); ++k)
     turned[k] = 255.0 * (1 - static_cast<double>(k) / static_cast<double>(turned.size() - 1));
-  for (const std::size_t heldout : found.reversed) bring(heldout, turned);
+  for (const std::size_t view : found.reversed) bring(view, turned);
+  if (found.flattened())
+    return skip(
+        fmt::format("the curves that bring {} shared places together leave {:.0f} % of "
+                    "what each view tells apart",
+                    found.points, 100 * found.slope));
   skip(fmt::format("levels of {} shared places are {:.1f} of 255 from their mean in the median",
                    found.points, found.before));
 }

@@ -62,21 +62,55 @@ void make_rise(GrayCurve& curve, const GrayCurve& weights) {
     for (std::size_t i = 0; i < pool.knots; ++i) curve[k++] = pool.value;
 }
 
-/// How levels of one view go with the levels of the same points elsewhere.
+/// How the levels that two views have of the same points go together.
 struct Together {
   double n = 0, x = 0, y = 0, xx = 0, yy = 0, xy = 0;
-  void add(double own, double others) {
-    ++n, x += own, y += others;
-    xx += own * own, yy += others * others, xy += own * others;
+  void add(double own, double other) {
+    ++n, x += own, y += other;
+    xx += own * own, yy += other * other, xy += own * other;
+  }
+  double variance_own() const { return n > 0 ? std::max(0.0, xx - x * x / n) : 0; }
+  double variance_other() const { return n > 0 ? std::max(0.0, yy - y * y / n) : 0; }
+  double covariance() const { return n > 0 ? xy - x * y / n : 0; }
+};
+
+/// How each view's levels go with every other's, about the means of what the two share: a view
+/// whose levels lie higher as a whole (a camera that drifts) says nothing of which way they rise.
+class Agreements {
+ public:
+  Agreements(const std::vector<LevelSight>& seen, const std::vector<LevelSight>& by_heldout,
+             std::size_t views)
+      : views_(views), pairs_(views * views) {
+    for (std::size_t p = 0; p < seen.size(); ++p)
+      for (const auto* own : {&seen[p], &by_heldout[p]})
+        for (const LevelSample& s : *own)
+          for (const LevelSample& o : seen[p])
+            if (o.view != s.view)
+              pairs_[static_cast<std::size_t>(s.view) * views_ + static_cast<std::size_t>(o.view)]
+                  .add(s.level, o.level);
+  }
+
+  /// Its levels fall where the others' rise, some of which are turned (right views of `van`, every
+  /// fourth inverted: .30 and more; inverted ones, while others were: -.38 and less).
+  bool against(std::size_t view, const std::vector<bool>& turned) const {
+    return correlation(view, turned) < -0.2;
   }
   /// 0 where too few tell.
-  double correlation() const {
-    const double of_both = (n * xx - x * x) * (n * yy - y * y);
-    return n >= least_samples && of_both > 0 ? (n * xy - x * y) / std::sqrt(of_both) : 0;
+  double correlation(std::size_t view, const std::vector<bool>& turned) const {
+    double n = 0, own = 0, other = 0, both = 0;
+    for (std::size_t o = 0; o < views_; ++o) {
+      const Together& pair = pairs_[view * views_ + o];
+      n += pair.n;
+      own += pair.variance_own();
+      other += pair.variance_other();
+      both += (turned[view] == turned[o] ? 1 : -1) * pair.covariance();
+    }
+    return n >= least_samples && own * other > 0 ? both / std::sqrt(own * other) : 0;
   }
-  /// They fall where the others rise (right ones of three scenes: .22 and more; turned ones, while
-  /// others were: -.37 and less).
-  bool against() const { return correlation() < -0.2; }
+
+ private:
+  std::size_t views_;
+  std::vector<Together> pairs_;  ///< [view * views_ + other that trains]
 };
 
 /// Points are eliminated, so each turn solves a system of the curves alone.
@@ -140,6 +174,18 @@ class CurveFit {
     return median(levels);
   }
 
+  /// Regression of common levels on the views' own, about each view's means.
+  double slope() const {
+    std::vector<Together> views(curves_.size());
+    for (const LevelSight& sight : sights_)
+      for (const LevelSample& s : sight)
+        views[static_cast<std::size_t>(s.view)].add(s.level, common_level(curve_of(s), s.level));
+    double covariance = 0, variance = 0;
+    for (const Together& view : views)
+      covariance += view.covariance(), variance += view.variance_own();
+    return variance > 0 ? covariance / variance : 1;
+  }
+
   double spread() const {
     double squares = 0, count = 0;
     for (const LevelSight& sight : sights_)
@@ -163,20 +209,6 @@ class CurveFit {
     return views;
   }
 
-  std::vector<Together> together() const {
-    std::vector<Together> views(curves_.size());
-    for (std::size_t p = 0; p < sights_.size(); ++p) {
-      double sum = 0;
-      for (const LevelSample& s : sights_[p]) sum += s.level;
-      const auto count = static_cast<double>(sights_[p].size());
-      for (const LevelSample& s : sights_[p])
-        views[static_cast<std::size_t>(s.view)].add(s.level, (sum - s.level) / (count - 1));
-      for (const LevelSample& s : by_heldout_[p])
-        views[static_cast<std::size_t>(s.view)].add(s.level, sum / count);
-    }
-    return views;
-  }
-
   void turn(std::size_t view) {
     reversed_[view] = !reversed_[view];
     for (auto* list : {&sights_, &by_heldout_})
@@ -188,21 +220,21 @@ class CurveFit {
   /// One after the other, the one that is most against the rest first: a second one makes the rest
   /// less sure. From here on all levels rise together.
   void turn_reversed() {
+    const Agreements agreements(sights_, by_heldout_, heldout_.size());
     const auto views =
         static_cast<std::size_t>(std::count(heldout_.begin(), heldout_.end(), false));
     for (std::size_t turned = 0; 2 * (turned + 1) < views; ++turned) {
-      const std::vector<Together> all = together();
       std::optional<std::size_t> most;
-      for (std::size_t v = 0; v < all.size(); ++v)
-        if (!heldout_[v] && !reversed_[v] && all[v].against() &&
-            (!most || all[v].correlation() < all[*most].correlation()))
+      for (std::size_t v = 0; v < heldout_.size(); ++v)
+        if (!heldout_[v] && !reversed_[v] && agreements.against(v, reversed_) &&
+            (!most ||
+             agreements.correlation(v, reversed_) < agreements.correlation(*most, reversed_)))
           most = v;
       if (!most) break;
       turn(*most);
     }
-    const std::vector<Together> all = together();
-    for (std::size_t v = 0; v < all.size(); ++v)
-      if (heldout_[v] && all[v].against()) turn(v);
+    for (std::size_t v = 0; v < heldout_.size(); ++v)
+      if (heldout_[v] && agreements.against(v, reversed_)) turn(v);
     weigh();
   }
 
@@ -341,8 +373,11 @@ void stretch(std::vector<GrayCurve>& curves, const Dataset& data,
 
 bool GrayCurves::told() const {
   constexpr double least_spread = 6;  // levels
-  return !of_view.empty() && (training_reversed || (spread > least_spread && left < 0.8 * before));
+  return !of_view.empty() && !flattened() &&
+         (training_reversed || (spread > least_spread && left < 0.8 * before));
 }
+
+bool GrayCurves::flattened() const { return slope < 0.5; }
 
 bool GrayCurves::contradict() const {
   constexpr double noise = 4;  // levels
@@ -361,6 +396,7 @@ GrayCurves estimate_gray_curves(const Dataset& dataset, const std::vector<DepthM
   found.left = fit.left();
   found.spread = fit.spread();
   found.variety = fit.variety();
+  found.slope = fit.slope();
   found.reversed = fit.reversed();
   found.training_reversed = std::any_of(found.reversed.begin(), found.reversed.end(),
                                         [&](std::size_t view) { return !heldout[view]; });

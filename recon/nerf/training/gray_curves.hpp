@@ -18,7 +18,10 @@ struct GrayCurves {
   double left = 0;     ///< median of how far samples are from their points' levels afterwards
   double before = 0;   ///< and before
   double variety = 0;  ///< median of how far points' levels are from the median one, afterwards
-  int points = 0;      ///< places of the maps that two views or more see
+  /// Of the curves over each view's own samples. The identity in their mean, they may still be flat
+  /// where each view has its levels, if these disagree and lie apart.
+  double slope = 1;
+  int points = 0;                     ///< places of the maps that two views or more see
   std::vector<std::size_t> reversed;  ///< views that show hot as black where most show it white
   bool training_reversed = false;     ///< one of these trains
   /// Views that share too little with others: their curve says nothing.
@@ -27,6 +30,8 @@ struct GrayCurves {
   /// Else images are better left as they are: of one span for all views, as some programs export
   /// them.
   bool told() const;
+  /// Curves that bring views together by telling nothing apart any more.
+  bool flattened() const;
   /// Views disagree, and no curves bring them together.
   bool contradict() const;
 };

@@ -92,6 +92,7 @@ Dataset training_part(const Dataset& dataset, const std::vector<bool>& heldout) 
   Dataset part;
   part.modality = dataset.modality;
   part.thermal_is_gray = dataset.thermal_is_gray;
+  part.counts = dataset.counts;
   std::vector<int> place(dataset.views.size(), -1);
   for (std::size_t i = 0; i < dataset.views.size(); ++i) {
     if (heldout[i]) continue;

@@ -39,12 +39,17 @@ class ModelSelection {
   bool has_best() const { return best_.has_value(); }
   const Reconstruction& best() const { return best_->poses.reconstruction; }
   FeatureLevel& best_level() const { return *best_level_; }  ///< whose features the best model has
-  /// The largest model that is only too small: nothing else speaks against it.
-  const std::optional<Reconstruction>& part() const { return part_; }
+  /// The largest model that is only too small: nothing else speaks against it. nullptr: none.
+  const Reconstruction* part() const { return part_ ? &part_->poses.reconstruction : nullptr; }
+  /// There being no best one, the part is that where it has the share of the views that stations
+  /// make enough and they and the matches agree with it; later models need no more views either.
+  bool take_part();
   /// The best one is the answer; its step says so.
   ModalityPoses& settle();
 
  private:
+  /// As the level was told, but for the share of the views where a part had to do.
+  PoseOptions asked_of(const FeatureLevel& level) const;
   bool only_too_small(const JudgedModel& judged, PoseOptions options) const;
   bool matches_contradict(const FeatureLevel& level, JudgedModel& judged) const;
   LadderStep fallen(const std::string& attempt, const std::string& why) const;
@@ -56,8 +61,10 @@ class ModelSelection {
   std::vector<LadderStep>& steps_;
   std::optional<JudgedModel> best_;
   FeatureLevel* best_level_ = nullptr;
-  std::optional<Reconstruction> part_;
-  std::size_t best_step_ = 0;
+  std::optional<JudgedModel> part_;
+  FeatureLevel* part_level_ = nullptr;
+  std::size_t best_step_ = 0, part_step_ = 0;
+  bool took_part_ = false;
   Clock::time_point since_ = Clock::now();
 };
 

@@ -82,6 +82,7 @@ class VisibleLadder {
     if (!selection_.has_best()) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
     if (!selection_.has_best()) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
     if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
+    selection_.take_part();
     if (selection_.has_best() && steps_.size() > 1) ORBITFUSE_TRY(spared(try_all_matches()));
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_joining()));
     if (selection_.has_best() && !complete()) {
@@ -404,6 +405,11 @@ class VisibleLadder {
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
     doubt_beyond(weakest_joint(poses.reconstruction), poses.reconstruction, poses.doubtful);
+    if (poses.posed_ratio() < options_.min_posed_ratio)
+      poses.warnings.push_back(fmt::format(
+          "{} of {} photos have a place, {:.0f} % are asked for (poses.min_posed_ratio): the "
+          "stations agree with these, and no attempt placed more",
+          poses.reconstruction.views.size(), total_, 100 * options_.min_posed_ratio));
     ORBITFUSE_TRY(spared(doubt_placed_elsewhere(poses)));
     const auto all = static_cast<int>(exhaustive_pairs(total_).size());
     if (pairs < all)

@@ -163,7 +163,8 @@ TEST_F(HostileRun, AStagesFolderWithoutItsRecordIsToldByInspect) {
   // Not to be looked into, but of no stage's name.
   fs::create_symlink("backup", out / "backup");
   const Outcome told = orbitfuse_program({"inspect", out.string(), "--json"});
-  EXPECT_EQ(told.code, 0) << told.err;
+  EXPECT_EQ(told.code, 3) << told.err;
+  EXPECT_THAT(told.err, HasSubstr("poses_visible: its record is missing"));
   EXPECT_EQ(told.result().at("without_record"), json({"poses_visible", "render"}));
   EXPECT_THAT(told.err, HasSubstr("poses_visible: there, but without a record (stage.json)"));
   // As without the right to look into it, which a superuser always has.

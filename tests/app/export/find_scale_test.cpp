@@ -129,6 +129,8 @@ TEST(FindScale, PlacesThatAreNoneAreNamed) {
   EXPECT_THAT(metres(origin, origin).error().message(), HasSubstr("that are one"));
   EXPECT_FALSE(metres(origin, Eigen::Vector3d(std::nan(""), 0, 0)));
   EXPECT_FALSE(metres(origin, Eigen::Vector3d(1e300, 0, 0)));
+  EXPECT_THAT(metres(origin, Eigen::Vector3d(0, 250, 260)).error().message(),
+              HasSubstr("outside of the scene"));
   EXPECT_THAT(metres(origin, measurement::PixelPlace{"visible/9.jpg", {1, 1}}).error().message(),
               HasSubstr("no posed view"));
   // So near each other that pointing is as coarse as the distance.

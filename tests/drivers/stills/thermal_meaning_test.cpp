@@ -9,7 +9,6 @@
 
 #include "core/image/image_codec.hpp"
 #include "core/image/image_io.hpp"
-#include "drivers/stills/float_temperatures.hpp"
 #include "drivers/stills/import.hpp"
 #include "tests/drivers/stills/import_files.hpp"
 #include "tests/support/made_files.hpp"
@@ -81,18 +80,22 @@ TEST_F(ThermalMeaning, FloatsAreKelvinOrCelsiusAndNanIsDead) {
   cv::Mat hot = floats(300, 2);
   hot.at<float>(5, 6) = 900;
   put("in/c.tiff", *encode_tiff(celsius, ""));
-  put("in/k.tiff", *encode_tiff(hot, ""));
-  put("in/l.tiff", *encode_tiff(floats(301, 3), ""));
   options.thermal_scale = ThermalScale::centikelvin;  // of counts; they have none
-  const ImportReport report = import();
-  ASSERT_EQ(report.thermal, 3);
+  ImportReport report = import();
+  ASSERT_EQ(report.thermal, 1);
   EXPECT_TRUE(report.has_temperatures);
-  EXPECT_NEAR(kelvin_of(report, 0).at<float>(9, 9), celsius.at<float>(9, 9) + 273.15, 0.021);
+  EXPECT_NEAR(kelvin_of(report, 0).at<float>(9, 9), celsius.at<float>(9, 9) + 273.15, 0.011);
   EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(3, 7)));
   EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(4, 7)));
-  EXPECT_NEAR(kelvin_of(report, 1).at<float>(5, 6), 900, 0.021);
-  EXPECT_NEAR(kelvin_of(report, 2).at<float>(9, 9), floats(301, 3).at<float>(9, 9), 0.021);
   EXPECT_THAT(report.warnings, test::one_says("c.tiff: 32-bit floats, read as Celsius"));
+  EXPECT_THAT(report.warnings, test::one_says("changes nothing in 1 of 1", "32-bit float"));
+  fs::remove(folder / "in/c.tiff");
+  put("in/k.tiff", *encode_tiff(hot, ""));
+  put("in/l.tiff", *encode_tiff(floats(301, 3), ""));
+  report = import();
+  ASSERT_EQ(report.thermal, 2);
+  EXPECT_NEAR(kelvin_of(report, 0).at<float>(5, 6), 900, 0.021);
+  EXPECT_NEAR(kelvin_of(report, 1).at<float>(9, 9), floats(301, 3).at<float>(9, 9), 0.021);
   EXPECT_THAT(report.warnings, test::one_says("k.tiff and 1 more", "read as kelvin"));
 }
 
@@ -154,14 +157,98 @@ TEST_F(ThermalMeaning, TwoScalesThatDifferAreTold) {
               test::one_says("a.tiff", "a scale of its own"));
 }
 
+/// One camera's files are of one unit, whatever each would be taken for by itself.
+TEST_F(ThermalMeaning, TheUnitOfFloatsIsDecidedForAllOfACamera) {
+  for (const int i : {1, 2, 3})
+    put("in/" + std::to_string(i) + ".tiff", *encode_tiff(floats(32, std::uint64_t(i)), ""));
+  put("in/4.tiff", *encode_tiff(floats(212, 4), ""));
+  ImportReport report = import();
+  ASSERT_EQ(report.thermal, 4);
+  EXPECT_NEAR(cv::mean(kelvin_of(report, 0))[0], 305.15, 0.5);
+  EXPECT_NEAR(cv::mean(kelvin_of(report, 3))[0], 485.15, 0.5);
+  EXPECT_THAT(report.warnings,
+              test::one_says("1.tiff and 3 more: 32-bit floats, read as Celsius", "1 of 4"));
+  // Most of them hot: as kelvin that would be -61 C.
+  for (const int i : {2, 3})
+    put("in/" + std::to_string(i) + ".tiff", *encode_tiff(floats(212, std::uint64_t(i)), ""));
+  report = import();
+  ASSERT_EQ(report.thermal, 4);
+  EXPECT_NEAR(cv::mean(kelvin_of(report, 3))[0], 485.15, 0.5);
+  // One that is none among those that are kelvin is left out, and changes nothing in them.
+  for (const int i : {2, 3, 4})
+    put("in/" + std::to_string(i) + ".tiff", *encode_tiff(floats(300, std::uint64_t(i)), ""));
+  report = import();
+  ASSERT_EQ(report.thermal, 3);
+  EXPECT_NEAR(cv::mean(kelvin_of(report, 0))[0], 300, 0.5);
+  EXPECT_THAT(report.warnings, test::one_says("left out", "1.tiff: 32-bit floats, read as kelvin"));
+}
+
+TEST_F(ThermalMeaning, ZerosThatMaskFloatsDecideNothing) {
+  cv::Mat kelvin = floats(300, 1);
+  kelvin(cv::Rect(0, 0, 40, 20)).setTo(0);
+  put("in/a.tiff", *encode_tiff(kelvin, ""));
+  const ImportReport report = import();
+  EXPECT_TRUE(std::isnan(kelvin_of(report, 0).at<float>(9, 9)));
+  EXPECT_NEAR(kelvin_of(report, 0).at<float>(25, 9), kelvin.at<float>(25, 9), 0.011);
+  EXPECT_THAT(report.warnings, test::one_says("read as kelvin"));
+}
+
+TEST_F(ThermalMeaning, AStatedScaleOrUnitHoldsForFloats) {
+  const cv::Mat hot = floats(212, 1);  // Celsius that look like kelvin
+  const auto mean_of = [&](const cv::Mat& values, const char* words, const char* sidecar = "") {
+    fs::remove(folder / "in/a.tiff.json");
+    put("in/a.tiff", *encode_tiff(values, words));
+    if (*sidecar) put("in/a.tiff.json", sidecar);
+    const ImportReport report = import();
+    EXPECT_THAT(report.warnings, test::none_says("read as"));
+    return cv::mean(kelvin_of(report, 0), kelvin_of(report, 0) > 0)[0];
+  };
+  EXPECT_NEAR(mean_of(hot, R"({"scale":1,"offset":273.15,"unit":"kelvin"})"), 485, 1);
+  EXPECT_NEAR(mean_of(hot, R"({"unit":"degrees Celsius"})"), 485, 1);
+  EXPECT_NEAR(mean_of(hot, "", R"({"scale":1,"offset":273.15})"), 485, 1);
+  EXPECT_NEAR(mean_of(hot, "", R"({"unit":"C"})"), 485, 1);
+  EXPECT_NEAR(mean_of(floats(70, 1), R"({"unit":"F"})", R"({"scale":0.55556,"offset":255.37})"),
+              294, 1);
+  EXPECT_NEAR(mean_of(floats(3000, 1), R"({"scale":0.1,"offset":0,"unit":"kelvin"})"), 300, 1);
+  cv::Mat masked = floats(3000, 1);
+  masked(cv::Rect(0, 0, 40, 2)).setTo(0);
+  EXPECT_NEAR(mean_of(masked, R"({"scale":0.01,"offset":270,"invalid":0})"), 300, 0.1);
+  options.thermal_scale = ThermalScale::linear;
+  options.kelvin_per_count = 1;
+  options.kelvin_offset = 273.15;
+  EXPECT_NEAR(mean_of(hot, ""), 485, 1);
+  put("in/a.tiff", *encode_tiff(hot, ""));
+  EXPECT_THAT(import().warnings, test::none_says("changes nothing"));
+}
+
+TEST_F(ThermalMeaning, AnotherUnitIsRefusedWithoutAScaleToo) {
+  put("in/a.tiff", *encode_tiff(floats(300, 1), ""));
+  put("in/b.tiff", *encode_tiff(floats(70, 2), R"({"unit":"Fahrenheit"})"));
+  put("in/c.tiff", *encode_tiff(floats(70, 3), R"({"scale":1,"unit":"Celsius"})"));
+  cv::Mat image(30, 40, CV_16UC1);
+  cv::RNG(8).fill(image, cv::RNG::UNIFORM, 29000, 29400);
+  put("in/d.tiff", *encode_tiff(image, R"({"unit":"Celsius"})"));
+  made::TiffWords words;
+  words.gdal_metadata =
+      "<GDALMetadata>\n  <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">degF</Item>\n"
+      "</GDALMetadata>\n";
+  put("in/e.tiff", made::tiff_of_pages({image}, words));
+  const ImportReport report = import();
+  EXPECT_EQ(report.thermal, 1);
+  for (const char* name : {"b.tiff: ", "c.tiff: ", "d.tiff: ", "e.tiff: "})
+    EXPECT_THAT(report.warnings, test::one_says("left out", name, "\"unit\"")) << name;
+}
+
 TEST_F(ThermalMeaning, FloatsThatAreNoTemperaturesAreRefused) {
-  for (const double middle : {-180.0, 20000.0}) {
-    const auto refused = float_temperatures(floats(middle, 1), "f.tif");
-    ASSERT_FALSE(refused) << middle;
-    EXPECT_THAT(refused.error().message(), test::says("f.tif", "100 x kelvin"));
-  }
-  EXPECT_FALSE(float_temperatures(
-      cv::Mat(3, 4, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN())), "f.tif"));
+  const auto refusal_of = [&](const cv::Mat& values) {
+    put("in/f.tif", *encode_tiff(values, ""));
+    const auto refused = ImportFiles::import();
+    return refused ? "" : refused.error().message();
+  };
+  for (const double middle : {-180.0, 20000.0})
+    EXPECT_THAT(refusal_of(floats(middle, 1)), test::says("f.tif", "100 x kelvin")) << middle;
+  const cv::Mat none(8, 9, CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN()));
+  EXPECT_THAT(refusal_of(none), test::says("f.tif", "without one temperature"));
 }
 
 }  // namespace

@@ -425,6 +425,21 @@ TEST(Measure, ABoxHoldsTheSurfaceInIt) {
   EXPECT_THAT(inside.notes[0], HasSubstr("no surface that one sees lies in it"));
 }
 
+TEST(Measure, ABoxFarLargerThanWhatIsInItIsMeasuredAsFinely) {
+  const ThermalScene scene = box_orbit();
+  const auto within = [&](const Eigen::Vector3d& size) {
+    Request request;
+    request.kind = Kind::box;
+    request.box.size = size;
+    return ask(scene, request).reading;
+  };
+  const TemperatureReading close = within({2, 2, 2}), wide = within({1e6, 1e6, 1e6}),
+                           beam = within({1e6, 0.2, 0.2});
+  EXPECT_GE(wide.points, close.points / 2);
+  EXPECT_NEAR(wide.temperature_k, close.temperature_k, 2);
+  EXPECT_GT(beam.points, 20);
+}
+
 TEST(Measure, APolygonHoldsWhatItsViewShows) {
   const ThermalScene scene = box_orbit();
   const PosedView& view = scene.frames()[0].view;

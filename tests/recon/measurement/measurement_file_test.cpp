@@ -87,6 +87,27 @@ TEST_F(MeasurementFile, WordsOfAnotherPlaceGoWithIt) {
   EXPECT_EQ(loaded->list.at(0).component, "hinge");
 }
 
+TEST_F(MeasurementFile, DistancesAreInTheMetresOfTodaysScale) {
+  Measurements saved;
+  SavedMeasurement span = spot("span");
+  span.request.kind = Kind::distance;
+  span.answer = {{"kind", "distance"},
+                 {"distance", 2.0},
+                 {"distance_m", 1.0},
+                 {"distance_uncertainty_m", 0.1}};
+  saved.list = {span, spot("beside")};
+  bring_to_scale(saved, 3.0, 0.01);
+  EXPECT_DOUBLE_EQ(saved.list[0].answer["distance_m"].get<double>(), 6);
+  EXPECT_NEAR(saved.list[0].answer["distance_uncertainty_m"].get<double>(), 0.06 * 1.645, 1e-12);
+  EXPECT_EQ(saved.list[1].answer, spot("beside").answer);
+  bring_to_scale(saved, std::nullopt, 0);
+  EXPECT_TRUE(saved.list[0].answer["distance_m"].is_null());
+  EXPECT_DOUBLE_EQ(saved.list[0].answer["distance"].get<double>(), 2);
+  saved.list[0].answer = "spoilt";
+  bring_to_scale(saved, 3.0, 0.01);
+  EXPECT_EQ(saved.list[0].answer, "spoilt");
+}
+
 TEST_F(MeasurementFile, NamesHaveOneBound) {
   EXPECT_TRUE(add_measurement(file, "run a", spot(std::string(longest_name_bytes, 'n'))));
   const std::string before = test::get(file), longer(longest_name_bytes + 1, 'n');

@@ -112,6 +112,33 @@ TEST(GrayCurves, BlackHotViewsAmongWhiteHotAreTurned) {
   EXPECT_TRUE(curves_of(white).reversed.empty());
 }
 
+/// A camera whose levels drift by more than the scene has: which views see a place then says more
+/// of its mean level than how warm it is.
+TEST(GrayCurves, ViewsOfADriftingCameraAreNotTurned) {
+  const Dataset data = gray_scene([](std::size_t view, double value) {
+    return 0.15 * value + 0.8 * static_cast<double>((5 * view) % gray_views) / gray_views;
+  });
+  EXPECT_TRUE(curves_of(data).reversed.empty());
+}
+
+/// Levels that lie apart and have nothing in common: flat curves bring them together.
+TEST(GrayCurves, CurvesThatTellNothingApartAreNotTaken) {
+  Dataset data = test::toy_scene(Modality::thermal, gray_views, 1, 288);
+  data.thermal_is_gray = true;
+  cv::RNG rng(5);
+  for (std::size_t i = 0; i < data.views.size(); ++i) {
+    cv::Mat1f patches(6, 8);
+    const double low = 20 + 16.0 * static_cast<double>((5 * i) % gray_views);
+    rng.fill(patches, cv::RNG::UNIFORM, low, low + 30);
+    cv::resize(patches, data.views[i].image, data.views[i].image.size(), 0, 0, cv::INTER_LINEAR);
+  }
+  const GrayCurves found = curves_of(data);
+  EXPECT_TRUE(found.flattened()) << found.slope;
+  EXPECT_FALSE(found.told());
+  for (const auto curve : {gain_and_level, bent})
+    EXPECT_GT(curves_of(gray_scene(curve)).slope, 0.8);
+}
+
 TEST(GrayCurves, AViewThatSharesNothingIsNamed) {
   Dataset data = gray_scene(gain_and_level);
   data.views[4].image = std::numeric_limits<float>::quiet_NaN();

@@ -229,6 +229,11 @@ TEST(Training, GrayViewsOfACameraOnAutomaticAreBroughtToOneScale) {
   const auto stored = train(gray, options, {}, field, &guide);
   ASSERT_TRUE(stored) << stored.error().message();
   EXPECT_TRUE(stored->gray_curves.empty());
+  options.even_exposure = true;
+  gray.counts = true;  // of one sensor: no curve was between
+  const auto counts = train(gray, options, {}, field, &guide);
+  ASSERT_TRUE(counts) << counts.error().message();
+  EXPECT_TRUE(counts->gray_curves.empty());
 }
 
 TEST(Training, StopsAtATargetAndKeepsTheBestStep) {
