@@ -108,9 +108,9 @@ Result<report::Table> measurement_table(const fs::path& out, const Session& sess
   if (!fs::exists(file, unreadable) && !unreadable) return table;
   ORBITFUSE_ASSIGN(const std::string identity, measurement_identity(out, session));
   ORBITFUSE_ASSIGN(measurement::Measurements saved, measurement::load_measurements(file, identity));
-  ORBITFUSE_ASSIGN(const std::optional<MetricScale> scale, scale_of_run(out));
-  if (scale)
-    bring_to_scale(saved, scale->metres_per_unit, scale->relative_uncertainty);
+  const auto scale = scale_of_run(out);  // the report says elsewhere what is wrong with it
+  if (scale && *scale)
+    bring_to_scale(saved, (*scale)->metres_per_unit, (*scale)->relative_uncertainty);
   else
     bring_to_scale(saved, std::nullopt, 0);
   for (const SavedMeasurement& m : saved.list) {

@@ -47,12 +47,17 @@ Status take_refined_poses(const nerf::TrainReport& report, const StageContext& c
   return save_poses(context, session, all);
 }
 
-/// Raw counts of a thermal camera, which no curve or palette turned.
+/// Raw counts of one thermal camera in one scale: a recording that was resumed stretches them anew,
+/// and says so each time.
 bool all_are_counts(const Session& session, Modality modality) {
   const auto frames = session.frames_of(modality, false);
-  return !frames.empty() && std::all_of(frames.begin(), frames.end(), [](const FrameRecord* f) {
-    return f->has_flag(FrameFlag::raw_counts);
-  });
+  const auto stretches = std::count_if(
+      session.events.begin(), session.events.end(),
+      [](const EventRecord& event) { return event.kind == name(EventKind::raw_counts); });
+  return stretches <= 1 && !frames.empty() &&
+         std::all_of(frames.begin(), frames.end(), [&](const FrameRecord* f) {
+           return f->has_flag(FrameFlag::raw_counts) && f->device == frames.front()->device;
+         });
 }
 
 Result<StageOutput> train(const StageContext& context, const SessionInput& input,

@@ -116,6 +116,8 @@ void tell_session(Context& context, const fs::path& folder, const std::string& s
       session, folder.string()));
 }
 
+constexpr const char* record_missing = ": its record is missing";
+
 /// What lies in the place of a stage's result without being one: no verb reads it, and a run
 /// refuses to replace it.
 void tell_without_record(Context& context, const fs::path& folder,
@@ -128,7 +130,7 @@ void tell_without_record(Context& context, const fs::path& folder,
         (fs::is_directory(place, unreadable) && fs::is_empty(place, unreadable)))
       continue;
     names.push_back(stage);
-    damaged.push_back(stage + ": its record is missing");
+    damaged.push_back(stage + record_missing);
     context.console.warning(fmt::format(
         "{}: there, but without a record ({}): nothing uses it, and the next run refuses to "
         "replace it; move it away, and run again",
@@ -215,7 +217,9 @@ Status inspect_run(Context& context, const fs::path& folder) {
   if (damaged.empty() && !scale) return tl::unexpected(scale.error());
   if (damaged.empty()) return {};
   return fail(ErrorKind::input, folder.string(), damaged.front(),
-              "run again: what is damaged is made anew");
+              damaged.front().ends_with(record_missing)
+                  ? "move its folder away and run again: nothing is written over what no run left"
+                  : "run again: what is damaged is made anew");
 }
 
 Status verdict_of(const Session& session, const std::vector<Error>& damaged) {

@@ -6,6 +6,11 @@
 namespace orbitfuse {
 
 bool has_colors(const cv::Mat& image) {
+  if (image.channels() >= 3 && image.depth() == CV_16U) {
+    cv::Mat levels;
+    image.convertTo(levels, CV_8U, 1.0 / 257);
+    return has_colors(levels);
+  }
   if (image.channels() < 3 || image.depth() != CV_8U) return false;
   constexpr int clear_of_compression = 24;  // levels
   constexpr double least_share = 0.02;

@@ -264,6 +264,17 @@ bool says_zero_is_none(std::string_view text) {
   return value.is_object() && value.contains("invalid") && value["invalid"] == 0;
 }
 
+Status check_invalid(std::string_view text, const std::string& where) {
+  const auto value = parse_json(text);
+  if (!value.is_object() || !value.contains("invalid")) return {};
+  // 0 is what the samples of this program have for none.
+  const auto& invalid = value["invalid"];
+  if (invalid.is_null() || invalid == 0) return {};
+  return fail(ErrorKind::input, where, fmt::format("\"invalid\": {}", invalid.dump().substr(0, 40)),
+              "only 0 marks samples without a temperature: set those samples to 0, and write "
+              "\"invalid\": 0");
+}
+
 Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_view text,
                                                                     const std::string& where) {
   const auto value = parse_json(text);
@@ -285,13 +296,7 @@ Result<std::optional<ThermalScaleTag>> thermal_scale_of_description(std::string_
   };
   ORBITFUSE_TRY(read("scale", tag.scale));
   ORBITFUSE_TRY(read("offset", tag.offset));
-  // 0 is what the samples of this program have for none; another count would be a temperature.
-  if (value.contains("invalid") && !value["invalid"].is_null() && value["invalid"] != 0) {
-    return fail(ErrorKind::input, where,
-                fmt::format("\"invalid\": {}", value["invalid"].dump().substr(0, 40)),
-                "only 0 marks samples without a temperature: set those samples to 0, and write "
-                "\"invalid\": 0");
-  }
+  ORBITFUSE_TRY(check_invalid(text, where));
   // Celsius would be off by 273 and look like a temperature all the same.
   if (const auto unit = value.find("unit"); unit != value.end() && unit->is_string()) {
     if (temperature_unit_called(unit->get<std::string>()) != TemperatureUnit::kelvin)

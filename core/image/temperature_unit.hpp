@@ -2,7 +2,10 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
+
+#include "core/result.hpp"
 
 namespace orbitfuse {
 
@@ -15,5 +18,7 @@ std::optional<TemperatureUnit> temperature_unit_of(std::string_view text);
 
 /// Whether such text says that samples of 0 are none ("invalid": 0).
 bool says_zero_is_none(std::string_view text);
+/// Input error where it says so of another number: such samples would be temperatures.
+Status check_invalid(std::string_view text, const std::string& where);
 
 }  // namespace orbitfuse

@@ -10,6 +10,7 @@
 
 #include "core/first_names.hpp"
 #include "core/image/image_codec.hpp"
+#include "core/image/temperature_unit.hpp"
 #include "core/image/tiff_file.hpp"
 #include "core/image/tiff_layout.hpp"
 #include "core/image/transparency.hpp"
@@ -76,12 +77,21 @@ bool next_page(TIFF* tiff, const TiffLayout& first) {
 }
 
 /// What a page says of its samples' scale or unit, else what the first does: programs write it once
-/// for the whole file.
+/// for the whole file. A page's unit alone (GDAL writes it for each) does not undo the first's
+/// scale, unless it is another unit.
 std::string description_of_page(std::string own, const std::string& firsts) {
-  const auto says_something = [](const std::string& text) {
-    return text.find("\"scale\"") != text.npos || text.find("\"unit\"") != text.npos;
+  const auto names = [](const std::string& text, const char* key) {
+    return text.find(key) != text.npos;
   };
-  return says_something(own) || !says_something(firsts) ? own : firsts;
+  constexpr const char* scale = "\"scale\"";
+  constexpr const char* unit = "\"unit\"";
+  if (names(own, scale)) return own;
+  if (!names(own, unit)) return names(firsts, scale) || names(firsts, unit) ? firsts : own;
+  if (!names(firsts, scale)) return own;
+  // A scale's unit is kelvin where it names none.
+  const std::optional<TemperatureUnit> of_first =
+      names(firsts, unit) ? temperature_unit_of(firsts) : TemperatureUnit::kelvin;
+  return temperature_unit_of(own) == of_first ? firsts : own;
 }
 
 std::string remedy_of(const TiffLayout& l) {

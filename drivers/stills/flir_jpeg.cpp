@@ -79,6 +79,8 @@ struct Records {
 
 constexpr std::string_view fff_magic("FFF\0", 4), aff_magic("AFF\0", 4);
 constexpr std::size_t max_recording_frames = 100'000;
+/// Cameras write 10 to 30. Each of the headers in a crafted file may announce as many as fit there.
+constexpr std::uint64_t max_records = 256;
 
 enum RecordType { raw_data = 0x01, camera_info = 0x20, embedded_image = 0x0e };
 
@@ -98,6 +100,10 @@ Result<Records> read_directory(std::string_view file, const std::string& where) 
   const std::uint64_t offset = header.u32(0x18), count = header.u32(0x1c);
   if (offset > file.size() || count > (file.size() - offset) / 32) {
     return broken(where, fmt::format("{} FLIR records announced in {} bytes", count, file.size()));
+  }
+  if (count > max_records) {
+    return broken(where, fmt::format("{} FLIR records announced, {} at most are one image's", count,
+                                     max_records));
   }
   Records records;
   for (std::uint64_t i = 0; i < count; ++i) {

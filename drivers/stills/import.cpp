@@ -182,8 +182,9 @@ class Importer {
     if (paged_file_ != source.file) {
       ORBITFUSE_ASSIGN(paged_bytes_, read_file(source.file, max_image_bytes));
       paged_file_ = source.file;
+      paged_frames_ = flir_recording_frames(paged_bytes_);
     }
-    Result<ThermalFile> page = thermal_file(paged_bytes_, source.file, source.page);
+    Result<ThermalFile> page = thermal_file(paged_bytes_, source.file, source.page, &paged_frames_);
     if (!page && page.error().where == source.file.string()) page.error().where = source.where();
     return page;
   }
@@ -353,6 +354,7 @@ class Importer {
   KnownFit known_fit_;
   fs::path paged_file_;  ///< whose pages are being added
   std::string paged_bytes_;
+  std::vector<std::string_view> paged_frames_;  ///< of a recording, in these bytes
   std::size_t done_ = 0, total_ = 0;
   std::optional<Error> first_failure_;  ///< of the modality that is being added
   ImportReport report_;

@@ -207,11 +207,12 @@ class Gathering {
         continue;
       }
       source.hash = content_hash(*bytes);
-      source.pages = thermal_page_count(*bytes);
+      const auto frames = flir_recording_frames(*bytes);  // none of other files
+      source.pages = frames.empty() ? thermal_page_count(*bytes) : static_cast<int>(frames.size());
       for (source.page = 0; source.page < source.pages; ++source.page) {
         source.taken_ns.reset();
         source.utc_offset_s.reset();
-        if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page)) {
+        if (const Result<ThermalFile> thermal = thermal_file(*bytes, file, source.page, &frames)) {
           decoder_.observe(*thermal, source.short_name());
           source.taken_ns = thermal->taken_ns;
           source.utc_offset_s = thermal->utc_offset_s;

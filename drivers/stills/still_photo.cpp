@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
 #include "core/image/exif.hpp"
 #include "core/image/transparency.hpp"
+#include "core/numeric/median.hpp"
 #include "core/system/file_io.hpp"
 #include "drivers/stills/heif_photo.hpp"
 
@@ -49,8 +51,23 @@ bool lies_across(cv::Size photo, const ThermalFile& file) {
   return shape(photo) * shape(samples) < 0;  // neither is square
 }
 
+/// Whether a channel has differences of colours: most of a photo is nearly grey, where they are in
+/// the middle of their range.
+bool has_differences(const cv::Mat& image, int channel) {
+  constexpr int middle = 128, tolerance = 24;  // levels
+  cv::Mat levels;
+  cv::extractChannel(image, levels, channel);
+  std::vector<std::uint8_t> samples(levels.begin<std::uint8_t>(), levels.end<std::uint8_t>());
+  return std::abs(median_in(samples) - middle) <= tolerance;
+}
+
 /// FLIR's photos that are PNGs hold luma and the two colour differences where PNG has red, green
-/// and blue.
+/// and blue. Nothing says so, and other firmware may write plain colours.
+bool is_of_luma_and_differences(const cv::Mat& bgr) {
+  return bgr.type() == CV_8UC3 && has_differences(bgr, 0) && has_differences(bgr, 1);
+}
+
+/// Of such an image.
 cv::Mat bgr_of_flir_png(const cv::Mat& image) {
   constexpr int from_to[] = {2, 0, 0, 1, 1, 2};  // of Cr, Cb, Y to Y, Cr, Cb
   cv::Mat ordered(image.size(), image.type()), out;
@@ -100,7 +117,7 @@ Result<StillPhoto> visible_still(std::string bytes, const std::string& where,
   }
   ORBITFUSE_TRY(check_frame_size(image.size(), where));
   if (inside && inside->flir && image_format(bytes) == ImageFormat::png &&
-      image.type() == CV_8UC3) {
+      is_of_luma_and_differences(image)) {
     image = bgr_of_flir_png(image);
     ORBITFUSE_ASSIGN(bytes, encode_png(image));
   }

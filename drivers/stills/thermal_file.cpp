@@ -17,8 +17,11 @@ namespace orbitfuse {
 namespace {
 
 Result<FlirImage> recorded_image(std::string_view bytes, const std::string& where,
-                                 std::optional<int> page) {
-  const auto frames = flir_recording_frames(bytes);
+                                 std::optional<int> page,
+                                 const std::vector<std::string_view>* known_frames) {
+  std::vector<std::string_view> found;
+  if (!known_frames) found = flir_recording_frames(bytes);
+  const std::vector<std::string_view>& frames = known_frames ? *known_frames : found;
   if (!page && frames.size() > 1) {
     return fail(ErrorKind::input, where,
                 fmt::format("a recording of {} images, one expected", frames.size()),
@@ -56,6 +59,15 @@ void take_time(ThermalFile& file, const ExifInfo& exif) {
   if (exif.taken_has_offset) file.utc_offset_s = exif.utc_offset_s;
 }
 
+/// What the text, of the file or its sidecar, says of samples that are none. Only where it names a
+/// scale or unit: the word may mean anything in other programs' texts.
+Status read_invalid(ThermalFile& file, std::string_view text, const std::string& where) {
+  ORBITFUSE_TRY(check_invalid(text, where));
+  if (file.kind == ThermalFile::Kind::floats && says_zero_is_none(text))
+    file.image.setTo(invalid_k, file.image == 0);
+  return {};
+}
+
 /// What the text, of the file or its sidecar, says of a unit where it names no scale.
 Status read_unit(ThermalFile& file, std::string_view text, const std::string& where) {
   const auto unit = temperature_unit_of(text);
@@ -85,12 +97,14 @@ Status read_sidecar(ThermalFile& file, const std::filesystem::path& sidecar) {
         beside->offset);
   } else if (!file.tag && beside) {
     file.tag = *beside;
-    if (file.kind == ThermalFile::Kind::floats && says_zero_is_none(text))
-      file.image.setTo(invalid_k, file.image == 0);
+    ORBITFUSE_TRY(read_invalid(file, text, where));
   } else if (!beside) {
     // Floats need no scale, only a unit.
     if (thermal_scale_of_description(text, where)) {
       ORBITFUSE_TRY(read_unit(file, text, where));
+      if (file.unit) {
+        ORBITFUSE_TRY(read_invalid(file, text, where));
+      }
     }
     if (!file.unit) return tl::unexpected(beside.error());
   }
@@ -101,8 +115,10 @@ Status read_sidecar(ThermalFile& file, const std::filesystem::path& sidecar) {
 /// a DJI file is the user's word.
 Status read_meaning(ThermalFile& file, const std::string& description, const std::string& where) {
   ORBITFUSE_ASSIGN(file.tag, thermal_scale_of_description(description, where));
-  if (file.tag && file.kind == ThermalFile::Kind::floats && says_zero_is_none(description))
-    file.image.setTo(invalid_k, file.image == 0);
+  // A sidecar's scale makes up for another unit (below), not for this.
+  if (file.tag || temperature_unit_of(description)) {
+    ORBITFUSE_TRY(read_invalid(file, description, where));
+  }
   const Status own_unit = file.tag ? Status{} : read_unit(file, description, where);
   const std::filesystem::path sidecar = where + ".json";
   std::error_code ignored;
@@ -136,14 +152,15 @@ int thermal_page_count(std::string_view bytes) {
 }
 
 Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& path,
-                                 std::optional<int> page) {
+                                 std::optional<int> page,
+                                 const std::vector<std::string_view>* known_frames) {
   ThermalFile file;
   const std::string where = path.string();
   const bool recording = is_flir_recording(bytes);
   if (recording || is_flir_jpeg(bytes)) {
     file.kind = ThermalFile::Kind::radiometric_jpeg;
-    ORBITFUSE_ASSIGN(file.flir,
-                     recording ? recorded_image(bytes, where, page) : read_flir_jpeg(bytes, where));
+    ORBITFUSE_ASSIGN(file.flir, recording ? recorded_image(bytes, where, page, known_frames)
+                                          : read_flir_jpeg(bytes, where));
     ORBITFUSE_TRY(check_frame_size(file.flir->signal.size(), where));
     file.taken_ns = file.flir->taken_ns;
     if (file.taken_ns) file.utc_offset_s = file.flir->utc_offset_s;
@@ -172,9 +189,10 @@ Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::
   if (file.image.depth() == CV_8U) {
     // Whoever reads thermal frames takes them as they are stored, one image a file.
     const bool one_of_several = page && thermal_page_count(bytes) > 1;
-    file.bytes = bytes;
     if (file.orientation != 1 || one_of_several) {
       ORBITFUSE_ASSIGN(file.bytes, encode_png(file.image));
+    } else {
+      file.bytes = bytes;
     }
     return file;
   }

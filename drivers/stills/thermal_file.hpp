@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/image/image_codec.hpp"
 #include "core/result.hpp"
@@ -47,9 +48,11 @@ Status check_frame_size(cv::Size size, const std::string& where);
 /// Without a page the file must hold a single image.
 Result<ThermalFile> read_thermal_file(const std::filesystem::path& file,
                                       std::optional<int> page = {});
-/// The same of bytes that were read from `file`.
+/// The same of bytes that were read from `file`. Whoever reads all pages of a recording gives its
+/// flir_recording_frames() too: finding them takes a pass over the file.
 Result<ThermalFile> thermal_file(std::string_view bytes, const std::filesystem::path& file,
-                                 std::optional<int> page = {});
+                                 std::optional<int> page = {},
+                                 const std::vector<std::string_view>* known_frames = nullptr);
 /// Images in the bytes: pages of a TIFF, frames of a FLIR recording; at least 1.
 int thermal_page_count(std::string_view bytes);
 

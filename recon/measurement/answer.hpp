@@ -12,6 +12,7 @@
 namespace orbitfuse::measurement {
 
 inline constexpr double sigmas_of_90_percent = 1.645;
+inline constexpr const char* no_scale_note = "no scale: the run doesn't know its unit in metres";
 
 inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 

@@ -335,7 +335,7 @@ Result<Answer> measure_distance(const ThermalScene& scene, const Request& reques
     answer.distance_uncertainty_m =
         sigmas_of_90_percent * scene.scale_relative_sigma() * *answer.distance_m;
   } else
-    answer.notes.emplace_back("no scale: the run doesn't know its unit in metres");
+    answer.notes.emplace_back(no_scale_note);
   return answer;
 }
 

@@ -183,6 +183,12 @@ void bring_to_scale(Measurements& saved, std::optional<double> metres_per_unit,
     const auto units = m.answer.find("distance");
     if (units == m.answer.end() || !units->is_number()) continue;
     m.answer["distance_m"] = m.answer["distance_uncertainty_m"] = json();
+    json notes = json::array();
+    if (const auto said = m.answer.find("notes"); said != m.answer.end() && said->is_array())
+      for (const json& note : *said)
+        if (note != no_scale_note) notes.push_back(note);
+    if (!metres_per_unit) notes.push_back(no_scale_note);
+    m.answer["notes"] = notes;
     if (!metres_per_unit) continue;
     const double metres = units->get<double>() * *metres_per_unit;
     m.answer["distance_m"] = metres;

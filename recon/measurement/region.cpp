@@ -302,6 +302,9 @@ Result<TemperatureReading> read_region(const ThermalScene& scene,
   result.points = static_cast<int>(points.size());
   result.seen_points = sum.seen_points;
   if (sum.field.area > 0) result.field_k = sum.field.sum / sum.field.area;
+  // As many frames as a point has in the mean.
+  const auto count = static_cast<int>(std::max<std::size_t>(1, points.size()));
+  for (int& frames : sum.hidden) frames = (frames + count - 1) / count;
   result.hidden = PointReadings{{}, sum.hidden}.why_hidden();
   if (sum.frames.empty()) return result;
   result.seen_share = sum.seen.area / sum.all_area;

@@ -80,14 +80,16 @@ class Agreements {
  public:
   Agreements(const std::vector<LevelSight>& seen, const std::vector<LevelSight>& by_heldout,
              std::size_t views)
-      : views_(views), pairs_(views * views) {
+      : views_(views), pairs_(views * views), samples_(views) {
     for (std::size_t p = 0; p < seen.size(); ++p)
       for (const auto* own : {&seen[p], &by_heldout[p]})
-        for (const LevelSample& s : *own)
+        for (const LevelSample& s : *own) {
+          const auto view = static_cast<std::size_t>(s.view);
+          ++samples_[view];
           for (const LevelSample& o : seen[p])
             if (o.view != s.view)
-              pairs_[static_cast<std::size_t>(s.view) * views_ + static_cast<std::size_t>(o.view)]
-                  .add(s.level, o.level);
+              pairs_[view * views_ + static_cast<std::size_t>(o.view)].add(s.level, o.level);
+        }
   }
 
   /// Its levels fall where the others' rise, some of which are turned (right views of `van`, every
@@ -97,20 +99,28 @@ class Agreements {
   }
   /// 0 where too few tell.
   double correlation(std::size_t view, const std::vector<bool>& turned) const {
-    double n = 0, own = 0, other = 0, both = 0;
+    if (samples_[view] < least_samples) return 0;
+    double own = 0, other = 0, both = 0;
     for (std::size_t o = 0; o < views_; ++o) {
       const Together& pair = pairs_[view * views_ + o];
-      n += pair.n;
       own += pair.variance_own();
       other += pair.variance_other();
       both += (turned[view] == turned[o] ? 1 : -1) * pair.covariance();
     }
-    return n >= least_samples && own * other > 0 ? both / std::sqrt(own * other) : 0;
+    return own * other > 0 ? both / std::sqrt(own * other) : 0;
+  }
+  /// Of all pairs.
+  double correlation() const {
+    double own = 0, other = 0, both = 0;
+    for (const Together& pair : pairs_)
+      own += pair.variance_own(), other += pair.variance_other(), both += pair.covariance();
+    return own * other > 0 ? both / std::sqrt(own * other) : 0;
   }
 
  private:
   std::size_t views_;
   std::vector<Together> pairs_;  ///< [view * views_ + other that trains]
+  std::vector<std::size_t> samples_;
 };
 
 /// Points are eliminated, so each turn solves a system of the curves alone.
@@ -184,6 +194,14 @@ class CurveFit {
     for (const Together& view : views)
       covariance += view.covariance(), variance += view.variance_own();
     return variance > 0 ? covariance / variance : 1;
+  }
+
+  /// Of the common levels of views that train.
+  double agreement() const {
+    std::vector<LevelSight> common = sights_;
+    for (LevelSight& sight : common)
+      for (LevelSample& s : sight) s.level = common_level(curve_of(s), s.level);
+    return Agreements(common, std::vector<LevelSight>(common.size()), curves_.size()).correlation();
   }
 
   double spread() const {
@@ -377,7 +395,7 @@ bool GrayCurves::told() const {
          (training_reversed || (spread > least_spread && left < 0.8 * before));
 }
 
-bool GrayCurves::flattened() const { return slope < 0.5; }
+bool GrayCurves::flattened() const { return slope < 0.5 && agreement < 0.7; }
 
 bool GrayCurves::contradict() const {
   constexpr double noise = 4;  // levels
@@ -397,6 +415,7 @@ GrayCurves estimate_gray_curves(const Dataset& dataset, const std::vector<DepthM
   found.spread = fit.spread();
   found.variety = fit.variety();
   found.slope = fit.slope();
+  found.agreement = fit.agreement();
   found.reversed = fit.reversed();
   found.training_reversed = std::any_of(found.reversed.begin(), found.reversed.end(),
                                         [&](std::size_t view) { return !heldout[view]; });

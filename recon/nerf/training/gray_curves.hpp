@@ -21,6 +21,9 @@ struct GrayCurves {
   /// Of the curves over each view's own samples. The identity in their mean, they may still be flat
   /// where each view has its levels, if these disagree and lie apart.
   double slope = 1;
+  /// Correlation of views' common levels, about the means of each pair. Few views of a wide range
+  /// among narrow ones make a slope small as well; their levels then go together.
+  double agreement = 1;
   int points = 0;                     ///< places of the maps that two views or more see
   std::vector<std::size_t> reversed;  ///< views that show hot as black where most show it white
   bool training_reversed = false;     ///< one of these trains

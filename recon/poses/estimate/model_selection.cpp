@@ -52,9 +52,9 @@ bool ModelSelection::consider(const std::string& attempt, const std::string& fou
       taken = true;
     } else if (judged && judged->believed) {
       step.why += "; no better than the model before";
-    } else if (judged && !contradicted &&
-               (!part_ || more_views(judged->poses.reconstruction, *part())) &&
-               only_too_small(*judged, level.options())) {
+    } else if (judged && !contradicted && only_too_small(*judged, level.options()) &&
+               (!part_ || (more_views(judged->poses.reconstruction, *part()) &&
+                           !matches_contradict(level, *judged)))) {
       part_ = std::move(*judged);
       part_level_ = &level;
       part_step_ = steps_.size();
@@ -73,11 +73,23 @@ ModalityPoses& ModelSelection::settle() {
   return best_->poses;
 }
 
-bool ModelSelection::take_part() {
+/// Nothing but its size speaks against it, nor did the stations or a larger model of another
+/// attempt: where the stations were declared wrongly a part of the views may still agree with them.
+bool ModelSelection::part_could_stand() const {
   if (best_ || !part_ || part_->poses.posed_ratio() < part_that_stands ||
-      part_level_->options().min_posed_ratio > PoseOptions{}.min_posed_ratio ||
-      !fit_stations(part()->views, session_))
+      part_level_->options().min_posed_ratio > PoseOptions{}.min_posed_ratio)
     return false;
+  const auto views = static_cast<int>(part()->views.size());
+  if (std::any_of(steps_.begin(), steps_.end(), [&](const LadderStep& step) {
+        return step.against_stations || step.posed > views;
+      }))
+    return false;
+  const auto fit = fit_stations(part()->views, session_);
+  return fit && fit->folded.empty() && fit->views >= part_that_stands * views;
+}
+
+bool ModelSelection::take_part() {
+  if (!part_could_stand()) return false;
   const std::size_t said = part_->why.size();
   const bool contradicted = matches_contradict(*part_level_, *part_);
   steps_[part_step_].why += part_->why.substr(said);

@@ -50,6 +50,7 @@ class ModelSelection {
  private:
   /// As the level was told, but for the share of the views where a part had to do.
   PoseOptions asked_of(const FeatureLevel& level) const;
+  bool part_could_stand() const;
   bool only_too_small(const JudgedModel& judged, PoseOptions options) const;
   bool matches_contradict(const FeatureLevel& level, JudgedModel& judged) const;
   LadderStep fallen(const std::string& attempt, const std::string& why) const;

@@ -79,9 +79,10 @@ class VisibleLadder {
     ORBITFUSE_TRY(try_settings(*quick, quick_name_, mapper_ladder().front()));
     if (!selection_.has_best() && selection_.part())
       ORBITFUSE_TRY(try_resection(*quick, "resection on part of a model"));
-    if (!selection_.has_best()) ORBITFUSE_TRY(spared(add_faint_features(*quick, orbit)));
-    if (!selection_.has_best()) ORBITFUSE_TRY(try_mapper(*quick, quick_name_));
-    if (!complete()) ORBITFUSE_TRY(improve(*quick, all_are_few));
+    if (!selection_.has_best()) ORBITFUSE_TRY(spared(add_faint_features(orbit)));
+    FeatureLevel& level = faint_ ? *faint_ : *quick;
+    if (!selection_.has_best()) ORBITFUSE_TRY(try_mapper(level, quick_name_));
+    if (!complete()) ORBITFUSE_TRY(improve(level, all_are_few));
     selection_.take_part();
     if (selection_.has_best() && steps_.size() > 1) ORBITFUSE_TRY(spared(try_all_matches()));
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_joining()));
@@ -92,12 +93,12 @@ class VisibleLadder {
             spared(try_resection(selection_.best_level(), "resection on points matched again")));
     }
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_alignment()));
-    return answer(quick->pairs());
+    return answer(level.pairs());
   }
 
  private:
   /// Where the usual features make no model, those of faint texture take their place.
-  Status add_faint_features(FeatureLevel& quick, const std::vector<ViewPair>& orbit) {
+  Status add_faint_features(const std::vector<ViewPair>& orbit) {
     tell(0, "features of faint texture");
     ORBITFUSE_ASSIGN(FeatureLevel faint,
                      FeatureLevel::extract(session_, frames_, options_, workdir_ / "faint",
@@ -105,7 +106,7 @@ class VisibleLadder {
     ORBITFUSE_TRY(look_at_features(faint));
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(faint.match(orbit, progress_));
-    quick = std::move(faint);
+    faint_ = std::move(faint);
     quick_name_ = "faint features, orbit pairs";
     return {};
   }
@@ -122,9 +123,10 @@ class VisibleLadder {
     return spared(attempted());
   }
 
-  /// An attempt that breaks down costs no model that is believed already.
+  /// An attempt that breaks down costs no model that is believed already, nor a part that stands.
   Status spared(Status done) {
-    if (done || !selection_.has_best() || done.error().kind == ErrorKind::cancelled) return done;
+    if (done || done.error().kind == ErrorKind::cancelled) return done;
+    if (!selection_.has_best() && !selection_.take_part()) return done;
     selection_.note_fallen("a further attempt", done.error().message());
     return {};
   }
@@ -431,7 +433,7 @@ class VisibleLadder {
   std::set<std::string> featureless_;
   bool rematched_ = false;  ///< the best model's points are those along its epipolar lines
   bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
-  std::optional<FeatureLevel> full_;
+  std::optional<FeatureLevel> faint_, full_;
 };
 
 }  // namespace

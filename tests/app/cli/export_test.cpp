@@ -104,6 +104,12 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
                          "90,90,90,1,1,1"});
   EXPECT_EQ(empty.code, 2);
   EXPECT_THAT(empty.err, HasSubstr("the cameras look at "));
+  // A scale of these would be wrong by orders of magnitude.
+  for (const auto& [place, said] : {std::pair("000,32,24", "a pixel of a rendered view"),
+                                    std::pair("300,0,0", "outside of the scene")})
+    expect_refused({"export", out.string(), "--to", (temp / "s.ply").string(), "--distance", place,
+                    "0,0,0", "1m"},
+                   2, said);
   const Outcome inside = surface(out / "train_thermal/cloud.ply");
   EXPECT_EQ(inside.code, 2);
   EXPECT_THAT(inside.err, HasSubstr("inside of a stage"));

@@ -61,9 +61,11 @@ TEST_F(FusionBatch, ThermalPicturesInColoursAreToldOnce) {
   ASSERT_TRUE(write_png(temp.path() / "t/a.png", gray3));
   EXPECT_TRUE(run()->remarks.empty()) << "gray, stored as three channels";
   fs::remove(temp.path() / "t/b.tiff");
-  for (const char* name : {"a", "b"})
-    ASSERT_TRUE(
-        write_png(temp.path() / "t" / (std::string(name) + ".png"), noise({40, 32}, CV_8UC3, 4)));
+  const cv::Mat colors = noise({40, 32}, CV_8UC3, 4);
+  cv::Mat deeper;
+  colors.convertTo(deeper, CV_16U, 257);
+  ASSERT_TRUE(write_png(temp.path() / "t/a.png", colors));
+  ASSERT_TRUE(write_png(temp.path() / "t/b.png", deeper));
   const auto told = run();
   ASSERT_TRUE(told);
   ASSERT_EQ(told->remarks.size(), 1u);

@@ -268,6 +268,44 @@ TEST_F(OtherCameras, AScaleOnTheFirstPageIsThatOfPagesWithoutOne) {
   EXPECT_NEAR(cv::mean(kelvin_of(report, 1))[0], 296, 1);
 }
 
+/// GDAL writes the unit for each page.
+TEST_F(OtherCameras, AUnitAloneDoesNotUndoTheFirstPagesScale) {
+  const auto import_with = [&](const std::string& unit_of_second) {
+    made::TiffWords words;
+    words.description = R"({"scale":0.04,"offset":0})";
+    words.gdal_metadata = "<GDALMetadata>\n  <Item name=\"UNITTYPE\" role=\"unittype\">" +
+                          unit_of_second + "</Item>\n</GDALMetadata>\n";
+    std::string bytes = made::tiff_of_pages(
+        {noise(CV_16UC1, 7300, 7500, 1), noise(CV_16UC1, 7300, 7500, 2)}, words);
+    const std::size_t size = words.description.size();
+    bytes.replace(bytes.rfind(words.description), size, std::string(size, ' '));
+    put("t/rec.tif", bytes);
+    return imported();
+  };
+  const ImportReport kelvin = import_with("K");
+  ASSERT_EQ(kelvin.thermal, 2);
+  EXPECT_NEAR(cv::mean(kelvin_of(kelvin, 1))[0], 296, 1);
+  const ImportReport other = import_with("degF");
+  EXPECT_EQ(other.thermal, 1);
+  EXPECT_THAT(other.warnings, test::one_says("left out", "rec.tif (image 2): ", "\"unit\""));
+}
+
+TEST_F(OtherCameras, MoreRecordsThanAnImageHasAreDamage) {
+  const std::string file =
+      made::flir_file(cv::Mat(120, 160, CV_16UC1, cv::Scalar(made::flir_signal(300, camera))),
+                      camera, made::FlirPixels::raw, {});
+  const auto announcing = [&](int records) {
+    std::string bytes = file;
+    bytes[0x1e] = static_cast<char>(records >> 8);
+    bytes[0x1f] = static_cast<char>(records & 0xff);
+    return bytes;
+  };
+  EXPECT_TRUE(read_flir_file(announcing(256), "r.fff"));
+  const auto refused = read_flir_file(announcing(257), "r.fff");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message(), test::says("r.fff", "257 FLIR records"));
+}
+
 TEST_F(OtherCameras, ADronesThermalImageIsNoPhoto) {
   put("in/1.jpg", made::dji_jpeg(cv::Mat(120, 160, CV_16UC1, cv::Scalar(9000))));
   put_photo("in/2.jpg", 1);
@@ -276,24 +314,30 @@ TEST_F(OtherCameras, ADronesThermalImageIsNoPhoto) {
   EXPECT_THAT(report.warnings, test::one_says("left out", "1.jpg", "a thermal image, not a photo"));
 }
 
-/// As a B60 writes it: luma and colour differences in the places of red, green and blue.
+/// As a B60 writes it: luma and colour differences in the places of red, green and blue. A picture
+/// that has these themselves there stays as it is.
 TEST_F(OtherCameras, AFlirCamerasPngHasItsColours) {
-  const cv::Mat color(60, 80, CV_8UC3, cv::Scalar(30, 60, 200));
-  cv::Mat luma;
-  cv::cvtColor(color, luma, cv::COLOR_BGR2YCrCb);
-  const cv::Vec3b y_cr_cb = luma.at<cv::Vec3b>(0, 0);
-  const cv::Mat as_stored(60, 80, CV_8UC3, cv::Scalar(y_cr_cb[1], y_cr_cb[2], y_cr_cb[0]));
-  put("t/a.jpg",
-      made::flir_jpeg(counts(1) / 2, camera, made::FlirPixels::raw, *encode_png(as_stored)));
   options.embedded_visible = true;
-  const ImportReport report = imported();
-  const auto frames = report.session.frames_of(Modality::visible);
-  ASSERT_EQ(frames.size(), 1u);
-  const auto image = read_visible(report.session.path_of(*frames[0]));
-  ASSERT_TRUE(image) << image.error().message();
-  EXPECT_NEAR(image->at<cv::Vec3b>(9, 9)[0], 30, 4);
-  EXPECT_NEAR(image->at<cv::Vec3b>(9, 9)[1], 60, 4);
-  EXPECT_NEAR(image->at<cv::Vec3b>(9, 9)[2], 200, 4);
+  const auto imported_of = [&](const cv::Mat& stored) -> cv::Mat {
+    put("t/a.jpg",
+        made::flir_jpeg(counts(1) / 2, camera, made::FlirPixels::raw, *encode_png(stored)));
+    const ImportReport report = imported();
+    const auto frames = report.session.frames_of(Modality::visible);
+    EXPECT_EQ(frames.size(), 1u);
+    if (frames.size() != 1) return cv::Mat(60, 80, CV_8UC3, cv::Scalar::all(0));
+    const auto image = read_visible(report.session.path_of(*frames[0]));
+    EXPECT_TRUE(image) << image.error().message();
+    return image ? *image : cv::Mat(60, 80, CV_8UC3, cv::Scalar::all(0));
+  };
+  cv::Mat color(60, 80, CV_8UC3, cv::Scalar(110, 120, 130));
+  color(cv::Rect(0, 0, 40, 30)).setTo(cv::Scalar(30, 60, 200));
+  cv::Mat luma, as_stored(color.size(), CV_8UC3);
+  cv::cvtColor(color, luma, cv::COLOR_BGR2YCrCb);
+  const int from_to[] = {0, 2, 1, 0, 2, 1};  // Y to red, Cr to blue, Cb to green
+  cv::mixChannels(&luma, 1, &as_stored, 1, from_to, 3);
+  EXPECT_LE(cv::norm(imported_of(as_stored), color, cv::NORM_INF), 4);
+  const cv::Mat red(60, 80, CV_8UC3, cv::Scalar(30, 60, 200));
+  EXPECT_EQ(cv::norm(imported_of(red), red, cv::NORM_INF), 0);
 }
 
 TEST_F(OtherCameras, EveryPageOfAnEightBitTiffIsAFrame) {

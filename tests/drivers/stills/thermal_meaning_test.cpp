@@ -221,6 +221,39 @@ TEST_F(ThermalMeaning, AStatedScaleOrUnitHoldsForFloats) {
   EXPECT_THAT(import().warnings, test::none_says("changes nothing"));
 }
 
+TEST_F(ThermalMeaning, WhatIsInvalidIsReadBesideAUnitAloneToo) {
+  cv::Mat masked = floats(20, 1);
+  masked(cv::Rect(0, 0, 40, 2)).setTo(0);
+  const std::string zero = R"({"unit":"celsius","invalid":0})";
+  for (const bool in_sidecar : {false, true}) {
+    put("in/a.tiff", *encode_tiff(masked, in_sidecar ? "" : zero));
+    if (in_sidecar) put("in/a.tiff.json", zero);
+    const ImportReport report = import();
+    ASSERT_EQ(report.thermal, 1);
+    const cv::Mat kelvin = kelvin_of(report, 0);
+    EXPECT_TRUE(std::isnan(kelvin.at<float>(1, 9))) << in_sidecar;
+    EXPECT_NEAR(kelvin.at<float>(9, 9), masked.at<float>(9, 9) + 273.15, 0.011);
+  }
+  // Another number would become a temperature.
+  put("in/b.tiff", *encode_tiff(floats(20, 2), R"({"unit":"celsius","invalid":999})"));
+  put("in/c.tiff", *encode_tiff(floats(20, 3), ""));
+  put("in/c.tiff.json", R"({"unit":"celsius","invalid":999})");
+  cv::Mat image(30, 40, CV_16UC1);
+  cv::RNG(8).fill(image, cv::RNG::UNIFORM, 29000, 29400);
+  put("in/d.tiff", *encode_tiff(image, R"({"unit":"kelvin","invalid":65535})"));
+  ImportReport report = import();
+  EXPECT_EQ(report.thermal, 1);
+  for (const char* found :
+       {"b.tiff: \"invalid\": 999", "c.tiff.json: \"invalid\": 999", "d.tiff: \"invalid\": 65535"})
+    EXPECT_THAT(report.warnings, test::one_says("left out", found)) << found;
+  // Not even with a scale for its unit.
+  put("in/b.tiff", *encode_tiff(floats(70, 2), R"({"unit":"F","invalid":999})"));
+  put("in/b.tiff.json", R"({"scale":0.55556,"offset":255.37})");
+  report = import();
+  EXPECT_EQ(report.thermal, 1);
+  EXPECT_THAT(report.warnings, test::one_says("left out", "b.tiff: \"invalid\": 999"));
+}
+
 TEST_F(ThermalMeaning, AnotherUnitIsRefusedWithoutAScaleToo) {
   put("in/a.tiff", *encode_tiff(floats(300, 1), ""));
   put("in/b.tiff", *encode_tiff(floats(70, 2), R"({"unit":"Fahrenheit"})"));

@@ -242,6 +242,11 @@ TEST(Measure, WhatNoFrameSeesOfARegionIsTold) {
   EXPECT_EQ(reading->seen_points, 10);
   EXPECT_NEAR(reading->seen_share, 1.0 / 3, 1e-9);
   EXPECT_THAT(reading->hidden, HasSubstr("too flat"));
+  // Of frames, whatever the number of points.
+  for (std::size_t at = 0;
+       (at = reading->hidden.find_first_of("123456789", at)) != std::string::npos;
+       at = reading->hidden.find(' ', at))
+    EXPECT_LE(std::stoul(reading->hidden.substr(at)), scene.frames().size()) << reading->hidden;
   for (const FrameLine& line : reading->frames) EXPECT_LE(line.covered, 1.0 / 3 + 1e-9);
   EXPECT_LT(reading->uncertainty_k, 1) << "the unseen half's field doesn't say how sure this is";
   Answer answer;

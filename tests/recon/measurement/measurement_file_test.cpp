@@ -6,6 +6,7 @@
 
 #include <thread>
 
+#include "recon/measurement/answer.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace orbitfuse::measurement {
@@ -94,13 +95,16 @@ TEST_F(MeasurementFile, DistancesAreInTheMetresOfTodaysScale) {
   span.answer = {{"kind", "distance"},
                  {"distance", 2.0},
                  {"distance_m", 1.0},
-                 {"distance_uncertainty_m", 0.1}};
+                 {"distance_uncertainty_m", 0.1},
+                 {"notes", {no_scale_note, "another"}}};
   saved.list = {span, spot("beside")};
   bring_to_scale(saved, 3.0, 0.01);
   EXPECT_DOUBLE_EQ(saved.list[0].answer["distance_m"].get<double>(), 6);
   EXPECT_NEAR(saved.list[0].answer["distance_uncertainty_m"].get<double>(), 0.06 * 1.645, 1e-12);
+  EXPECT_EQ(saved.list[0].answer["notes"], json({"another"}));
   EXPECT_EQ(saved.list[1].answer, spot("beside").answer);
   bring_to_scale(saved, std::nullopt, 0);
+  EXPECT_EQ(saved.list[0].answer["notes"], json({"another", no_scale_note}));
   EXPECT_TRUE(saved.list[0].answer["distance_m"].is_null());
   EXPECT_DOUBLE_EQ(saved.list[0].answer["distance"].get<double>(), 2);
   saved.list[0].answer = "spoilt";
