@@ -141,7 +141,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 23;  // parts that stations confirm
+  stage.version = 24;  // every view is asked whether its matches hold it elsewhere
   if (!visible) {
     stage.version = 30;  // without photos in doubt
     stage.uses = {"poses_visible"};

@@ -11,23 +11,10 @@
 #include "core/geometry/scene_ball.hpp"
 #include "core/system/parallel.hpp"
 #include "recon/poses/index.hpp"
-#include "recon/poses/sfm/held_matches.hpp"
 #include "recon/poses/sfm/resection.hpp"
 
 namespace orbitfuse {
 namespace {
-
-/// Of each frame's verified matches with posed ones, the share that the poses hold; 1 without any.
-std::vector<double> held_shares(const FeatureGraph& graph, const PosedFrames& posed) {
-  std::vector<double> all(at(graph.count()), 0), held = all;
-  for (const PairVote& vote : votes_of(graph, posed))
-    for (const int f : {vote.pair.first, vote.pair.second}) {
-      all[at(f)] += static_cast<double>(vote.matches);
-      held[at(f)] += static_cast<double>(vote.held);
-    }
-  for (std::size_t f = 0; f < all.size(); ++f) held[f] = all[f] > 0 ? held[f] / all[f] : 1;
-  return held;
-}
 
 double orbit_radius(const Reconstruction& model) {
   std::vector<Eigen::Vector3d> centers;
@@ -62,10 +49,9 @@ Result<std::vector<DoubtfulView>> placed_elsewhere(const FeatureGraph& graph,
   const PosedFrames posed = posed_frames(graph, model);
   TrackOptions track;
   track.max_error_px *= graph.pixel_scale;
-  const std::vector<double> held = held_shares(graph, posed);
   std::vector<int> asked;
   for (int f = 0; f < graph.count(); ++f)
-    if (posed.poses[at(f)] && held[at(f)] < options.plainly_held) asked.push_back(f);
+    if (posed.poses[at(f)]) asked.push_back(f);
   std::vector<DoubtfulView> views;
   const double radius = orbit_radius(model);
   if (asked.empty() || !(radius > 0)) return views;
