@@ -15,6 +15,7 @@
 #include "app/export/surface_files.hpp"
 #include "app/pipeline/out_folder.hpp"
 #include "app/pipeline/stage_record.hpp"
+#include "app/verbs/measure_options.hpp"
 
 namespace orbitfuse::cli {
 namespace {
@@ -86,12 +87,12 @@ Result<FileOptions> file_options(const ExportArguments& o, const view::FinishedR
   return files;
 }
 
-/// Whether a word that reads as a number is the name of a view: new views are called 000, 001 ...
-bool names_new_view(const std::string& out, const std::string& word) {
-  const bool digits = word.find_first_not_of("0123456789") == std::string::npos;
+/// The name of one of the run's new views, of more than a hundred too.
+bool is_new_view(const std::string& out, const std::string& word) {
   std::error_code ignored;
-  return digits && ((word.size() > 1 && word[0] == '0') ||
-                    fs::exists(fs::path(out) / "render/depth" / (word + ".tiff"), ignored));
+  return names_new_view(word) ||
+         (word.find_first_not_of("0123456789") == std::string::npos &&
+          fs::exists(fs::path(out) / "render/depth" / (word + ".tiff"), ignored));
 }
 
 /// VIEW,U,V or X,Y,Z: the first word decides.
@@ -102,7 +103,7 @@ Result<measurement::Place> place_of(const std::string& out, const std::string& w
   const std::size_t comma = word.find(',');
   if (comma == std::string::npos || comma == 0)
     return fail(ErrorKind::usage, "--distance", "'" + word + "'", form);
-  if (names_new_view(out, word.substr(0, comma)))
+  if (is_new_view(out, word.substr(0, comma)))
     return fail(ErrorKind::usage, "--distance", "'" + word + "', a pixel of a rendered view",
                 "point at one of a recorded view, e.g. visible/000003.jpg,320,240");
   if (error == std::errc() && stop == word.data() + comma) {

@@ -84,9 +84,7 @@ Result<Request> spot_or_saved(const std::string& option, const std::string& word
   if (parts.size() != 3)
     return wrong_word(option, word, "VIEW,U,V, or X,Y,Z, or the name of a saved measurement");
   // "000" is the name of a rendered view before it is a number.
-  const bool numbered = parts[0].size() > 1 && parts[0][0] == '0' &&
-                        parts[0].find_first_not_of("0123456789") == std::string::npos;
-  const bool pixel = scene.has_view(parts[0]) || numbered || !number(parts[0]);
+  const bool pixel = scene.has_view(parts[0]) || names_new_view(parts[0]) || !number(parts[0]);
   ORBITFUSE_ASSIGN(Place place, pixel ? pixel_of(option, word) : point_of(option, word));
   request.places = {std::move(place)};
   return request;
@@ -239,6 +237,11 @@ Result<Request> read(const MeasureWords& words, const std::string& option,
 }
 
 }  // namespace
+
+bool names_new_view(const std::string& word) {
+  return word.size() > 1 && word[0] == '0' &&
+         word.find_first_not_of("0123456789") == std::string::npos;
+}
 
 void add_measure_options(CLI::App& app, MeasureWords& w) {
   constexpr const char* kinds = "What to measure";

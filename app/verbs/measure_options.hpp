@@ -24,6 +24,9 @@ struct MeasureWords {
   bool save = false, csv = false;
 };
 
+/// Whether a word that reads as a number is the name of a new view: they are called 000, 001 ...
+bool names_new_view(const std::string& word);
+
 void add_measure_options(CLI::App& app, MeasureWords& words);
 
 /// Usage error for options that mean nothing beside the others, or without another one.

@@ -15,8 +15,8 @@ namespace {
 
 /// Share of the views from which on a model that can't stand alone is worth completing.
 constexpr double part_of_a_model = 0.5;
-/// From which on it can, where stations confirm it and no attempt made a larger one. Chosen on a
-/// tail of an aeroplane and a forklift with noisy pictures, 18 and 19 views of 24, both right
+/// From which on it can, where stations confirm it and no attempt made a larger one. Chosen on
+/// `plane` and `forklift` in noisy pictures, 18 and 19 views of 24, both right
 /// (docs/notes/poses_visible.md).
 constexpr double part_that_stands = 0.7;
 
