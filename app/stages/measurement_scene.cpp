@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <set>
 
 #include "app/pipeline/stage_record.hpp"
@@ -31,8 +32,9 @@ Status add_thermal(const pipeline::StageContext& context, const Session& session
                    SceneParts& parts) {
   ORBITFUSE_ASSIGN(nerf::Field field, nerf::Field::load(context.of("train_thermal") / field_file));
   ORBITFUSE_ASSIGN(const Similarity3d world_from_thermal, load_world_from_thermal(context));
-  parts.field = measurement::field_renderer(std::make_shared<const nerf::Field>(std::move(field)),
-                                            world_from_thermal);
+  const auto shared = std::make_shared<const nerf::Field>(std::move(field));
+  parts.field = measurement::field_renderer(shared, world_from_thermal);
+  parts.surface.depth = measurement::surface_renderer(shared, world_from_thermal);
   ORBITFUSE_ASSIGN(const Reconstruction model, load_trained_poses(context, Modality::thermal));
   ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_thermal")));
   for (PosedView view : model.views) {
@@ -59,6 +61,37 @@ Status add_thermal(const pipeline::StageContext& context, const Session& session
     if (shading_k != 0) kelvin -= nerf::shading_image(shading_k, kelvin.size());
     return kelvin;
   };
+  return {};
+}
+
+/// The visible field's surface in place of the thermal one's, which has no fine form. It is read
+/// when the first distance is asked for.
+Status add_visible_surface(const pipeline::StageContext& context, SceneParts& parts) {
+  for (const ThermalFrame& frame : parts.frames)
+    if (!frame.doubtful()) parts.surface.views.push_back(frame.view);
+  if (!is_in_visible_world(context) || !context.has("train_visible")) return {};
+  struct Loaded {
+    std::once_flag once;
+    Result<measurement::DepthRenderer> depth;
+  };
+  parts.surface.depth = [file = context.of("train_visible") / field_file,
+                         loaded = std::make_shared<Loaded>()](
+                            const Camera& camera, const Rigid3d& cam_from_world,
+                            const Progress& progress) -> Result<cv::Mat> {
+    std::call_once(loaded->once, [&] {
+      loaded->depth = nerf::Field::load(file).map([](nerf::Field&& field) {
+        return measurement::surface_renderer(std::make_shared<const nerf::Field>(std::move(field)),
+                                             Similarity3d());
+      });
+    });
+    if (!loaded->depth) return tl::unexpected(loaded->depth.error());
+    return (*loaded->depth)(camera, cam_from_world, progress);
+  };
+  ORBITFUSE_ASSIGN(const Reconstruction model, load_trained_poses(context, Modality::visible));
+  ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_visible")));
+  parts.surface.views.clear();
+  for (const PosedView& view : model.views)
+    if (!doubts.contains(view.name)) parts.surface.views.push_back(view);
   return {};
 }
 
@@ -157,6 +190,7 @@ Result<ThermalScene> load_measurement_scene(const fs::path& out, const Session& 
   SceneParts parts;
   ORBITFUSE_TRY(add_thermal(context, session, parts));
   ORBITFUSE_TRY(check_as_written(context));
+  ORBITFUSE_TRY(add_visible_surface(context, parts));
   ORBITFUSE_TRY(add_named_views(context, parts));
   add_unposed(session, parts);
   ORBITFUSE_ASSIGN(parts.identity, identity_of(context, session));

@@ -141,18 +141,28 @@ json to_json(const Answer& answer) {
   }
   if (answer.kind == Kind::distance) {
     j["distance"] = json_of(answer.distance);
+    j["distance_uncertainty"] = json_of(answer.distance_uncertainty);
     j["distance_m"] = answer.distance_m ? json_of(*answer.distance_m) : json();
     j["distance_uncertainty_m"] = json_of(answer.distance_uncertainty_m);
   }
   return j;
 }
 
+double distance_uncertainty_m(double distance, double uncertainty, double metres_per_unit,
+                              double scale_relative_sigma) {
+  const double scale = sigmas_of_90_percent * scale_relative_sigma * distance;
+  return metres_per_unit * std::hypot(scale, std::isfinite(uncertainty) ? uncertainty : 0);
+}
+
 std::string distance_words(const Answer& answer, const char* plus_minus) {
-  if (!answer.distance_m) return fmt::format("{:.4f} units of the run", answer.distance);
-  if (!std::isfinite(answer.distance_uncertainty_m))
-    return fmt::format("{:.3f} m", *answer.distance_m);
-  return fmt::format("{:.3f} m {} {:.3f}", *answer.distance_m, plus_minus,
-                     answer.distance_uncertainty_m);
+  const auto with = [&](double uncertainty, int digits) {
+    return std::isfinite(uncertainty) ? fmt::format(" {} {:.{}f}", plus_minus, uncertainty, digits)
+                                      : std::string();
+  };
+  if (!answer.distance_m)
+    return fmt::format("{:.4f} units of the run", answer.distance) +
+           with(answer.distance_uncertainty, 4);
+  return fmt::format("{:.3f} m", *answer.distance_m) + with(answer.distance_uncertainty_m, 3);
 }
 
 }  // namespace orbitfuse::measurement

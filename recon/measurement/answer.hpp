@@ -93,12 +93,12 @@ struct Answer {
   /// The camera's part of both uncertainties counts in full: two places lie on different samples
   /// of the sensor, and of what is assumed only drift, a part unknown, is the same for both.
   double difference_k = unknown, difference_uncertainty_k = unknown;
-  std::vector<Answer> of;            ///< of a difference
-  double distance = unknown;         ///< world units
-  std::optional<double> distance_m;  ///< where the run's scale is known
-  /// What the scale alone leaves open in 90 of 100 cases; where the places lie is not in it.
-  double distance_uncertainty_m = unknown;
-  UsedParameters radiometry;  ///< of a difference: in its parts
+  std::vector<Answer> of;  ///< of a difference
+  /// World units. The error is below the uncertainty in 90 of 100 cases: of where the places lie.
+  double distance = unknown, distance_uncertainty = unknown;
+  std::optional<double> distance_m;         ///< where the run's scale is known
+  double distance_uncertainty_m = unknown;  ///< of the places and of the scale together
+  UsedParameters radiometry;                ///< of a difference: in its parts
   /// What the reader must know: nothing seen, assumptions. Those of one of several places begin
   /// with place_words().
   std::vector<std::string> notes;
@@ -108,7 +108,11 @@ struct Answer {
 std::string place_words(std::size_t index);
 
 nlohmann::json to_json(const Answer& answer);
-/// "1.204 m +- 0.012", or "0.8812 units of the run" where it knows no metres.
+/// Of a distance in world units with its uncertainty (NaN: not known, counts as none), by a scale
+/// with a relative standard deviation.
+double distance_uncertainty_m(double distance, double uncertainty, double metres_per_unit,
+                              double scale_relative_sigma);
+/// "1.204 m +- 0.012", or "0.8812 units of the run +- 0.0043" where it knows no metres.
 std::string distance_words(const Answer& answer, const char* plus_minus = "+-");
 /// Temperatures of other object parameters are not to be compared without a word: those words,
 /// where emissivity or reflected temperature of the two differ or may. None: they are alike.

@@ -103,8 +103,9 @@ Status read(const JsonFields& in, Answer& answer, int depth) {
   }));
   ORBITFUSE_TRY(in.get_present("ends", answer.ends, "difference_k", answer.difference_k,
                                "uncertainty_k", answer.difference_uncertainty_k, "distance",
-                               answer.distance, "distance_m", answer.distance_m,
-                               "distance_uncertainty_m", answer.distance_uncertainty_m));
+                               answer.distance, "distance_uncertainty", answer.distance_uncertainty,
+                               "distance_m", answer.distance_m, "distance_uncertainty_m",
+                               answer.distance_uncertainty_m));
   if (const json* of = in.find("of"); of != nullptr && !of->empty() && depth > 0)
     return in.wrong("of", "absent: a difference has no differences as its parts");
   return each(in, "of", [&](const JsonFields& entry) {

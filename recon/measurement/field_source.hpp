@@ -14,4 +14,9 @@ namespace orbitfuse::measurement {
 FieldRenderer field_renderer(std::shared_ptr<const nerf::Field> thermal,
                              const Similarity3d& world_from_thermal, double min_opacity = 0.5);
 
+/// Depth of the surface that is exported (FieldSurfaceOptions), from a field in a world that need
+/// not be its own.
+DepthRenderer surface_renderer(std::shared_ptr<const nerf::Field> field,
+                               const Similarity3d& world_from_field);
+
 }  // namespace orbitfuse::measurement

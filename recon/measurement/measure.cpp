@@ -21,28 +21,10 @@ namespace {
 
 constexpr double default_apart = 0.1;  // of the object's reach
 
-std::string words(const Eigen::Vector3d& p) {
-  return fmt::format("{:.4g},{:.4g},{:.4g}", p.x(), p.y(), p.z());
-}
-
-/// Points of no scene: farther off than its surroundings, and in no picture.
-Status check_within(const ThermalScene& scene, const Eigen::Vector3d& point) {
-  if (!scene.middle()) return {};
-  const ThermalScene::Middle& middle = *scene.middle();
-  const double distance = (point - middle.center).norm();
-  if (distance <= surroundings_reach * middle.radius) return {};
-  return fail(ErrorKind::input, "point " + words(point),
-              fmt::format("outside of the scene: {:.3g} from its middle, the cameras stand {:.3g} "
-                          "from it",
-                          distance, middle.radius),
-              fmt::format("give coordinates of this run's world; the scene's middle is {}",
-                          words(middle.center)));
-}
-
 /// Normal and field temperature of a point, from the frames that see it.
 Result<SurfacePoint> surface_at_point(const ThermalScene& scene, const Eigen::Vector3d& position,
                                       const Progress& progress) {
-  ORBITFUSE_TRY(check_within(scene, position));
+  ORBITFUSE_TRY(scene.check_within(position));
   SurfacePoint point;
   point.position = position;
   point.normal.setZero();
@@ -322,18 +304,29 @@ Result<Answer> measure_difference(const ThermalScene& scene, const Request& requ
   return answer;
 }
 
+Result<Located> locate(const ThermalScene& scene, const Place& place, const Progress& progress) {
+  if (const auto* point = std::get_if<Eigen::Vector3d>(&place))
+    return scene.locate(*point, progress);
+  const auto& pixel = std::get<PixelPlace>(place);
+  ORBITFUSE_ASSIGN(const PosedView* view, scene.view(pixel.view));
+  return scene.locate(*view, pixel.pixel, progress);
+}
+
 Result<Answer> measure_distance(const ThermalScene& scene, const Request& request,
                                 const Progress& progress) {
   Answer answer;
-  ORBITFUSE_ASSIGN(const SurfacePoint a, surface_of(scene, request.places[0], progress));
-  ORBITFUSE_ASSIGN(const SurfacePoint b, surface_of(scene, request.places[1], progress));
-  answer.distance = (a.position - b.position).norm();
+  ORBITFUSE_ASSIGN(const Located a, locate(scene, request.places[0], progress));
+  ORBITFUSE_ASSIGN(const Located b, locate(scene, request.places[1], progress));
+  const Apart between = apart(a, b);
+  answer.distance = between.length;
+  answer.distance_uncertainty = sigmas_of_90_percent * between.sigma;
   answer.ends = {a.position, b.position};
   answer.position = 0.5 * (a.position + b.position);
   if (scene.metres_per_unit()) {
     answer.distance_m = answer.distance * *scene.metres_per_unit();
     answer.distance_uncertainty_m =
-        sigmas_of_90_percent * scene.scale_relative_sigma() * *answer.distance_m;
+        distance_uncertainty_m(answer.distance, answer.distance_uncertainty,
+                               *scene.metres_per_unit(), scene.scale_relative_sigma());
   } else
     answer.notes.emplace_back(no_scale_note);
   return answer;

@@ -190,9 +190,12 @@ void bring_to_scale(Measurements& saved, std::optional<double> metres_per_unit,
     if (!metres_per_unit) notes.push_back(no_scale_note);
     m.answer["notes"] = notes;
     if (!metres_per_unit) continue;
-    const double metres = units->get<double>() * *metres_per_unit;
-    m.answer["distance_m"] = metres;
-    m.answer["distance_uncertainty_m"] = sigmas_of_90_percent * relative_sigma * metres;
+    const auto uncertain = m.answer.find("distance_uncertainty");
+    m.answer["distance_m"] = units->get<double>() * *metres_per_unit;
+    m.answer["distance_uncertainty_m"] = distance_uncertainty_m(
+        units->get<double>(),
+        uncertain != m.answer.end() && uncertain->is_number() ? uncertain->get<double>() : unknown,
+        *metres_per_unit, relative_sigma);
   }
 }
 

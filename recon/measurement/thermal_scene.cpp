@@ -13,6 +13,7 @@
 #include "core/geometry/narrowed.hpp"
 #include "core/image/undistorted.hpp"
 #include "core/near_word.hpp"
+#include "recon/assembly/looked_at.hpp"
 #include "recon/assembly/new_views.hpp"
 
 namespace orbitfuse::measurement {
@@ -113,6 +114,14 @@ ThermalScene::ThermalScene(SceneParts parts, const MeasurementOptions& options)
       cached_(std::make_unique<std::vector<Cached>>(parts_.frames.size())) {
   if (const auto orbit = orbit_geometry(parts_.orbit))
     middle_ = Middle{orbit->center, orbit->radius};
+  if (parts_.surface.depth) return;
+  parts_.surface.depth = [field = parts_.field](const Camera& camera, const Rigid3d& cam_from_world,
+                                                const Progress& progress) -> Result<cv::Mat> {
+    ORBITFUSE_ASSIGN(const FieldView seen, field(camera, cam_from_world, progress));
+    return seen.depth;
+  };
+  for (const ThermalFrame& frame : parts_.frames)
+    if (!frame.doubtful()) parts_.surface.views.push_back(frame.view);
 }
 ThermalScene::ThermalScene(ThermalScene&&) noexcept = default;
 ThermalScene& ThermalScene::operator=(ThermalScene&&) noexcept = default;
@@ -175,15 +184,32 @@ Result<FieldView> ThermalScene::seen(std::size_t frame, const Progress& progress
   return *cached.view;
 }
 
+Status ThermalScene::check_within(const Eigen::Vector3d& point) const {
+  const auto words = [](const Eigen::Vector3d& p) {
+    return fmt::format("{:.4g},{:.4g},{:.4g}", p.x(), p.y(), p.z());
+  };
+  if (!point.allFinite())
+    return fail(ErrorKind::input, "point " + words(point), "not finite", "write X,Y,Z");
+  if (!middle_) return {};
+  const double distance = (point - middle_->center).norm();
+  if (distance <= surroundings_reach * middle_->radius) return {};
+  return fail(ErrorKind::input, "point " + words(point),
+              fmt::format("outside of the scene: {:.3g} from its middle, the cameras stand {:.3g} "
+                          "from it",
+                          distance, middle_->radius),
+              fmt::format("give coordinates of this run's world; the scene's middle is {}",
+                          words(middle_->center)));
+}
+
+Result<Located> ThermalScene::locate(const Eigen::Vector3d& point, const Progress& progress) const {
+  ORBITFUSE_TRY(check_within(point));
+  return located(parts_.surface, point, middle_ ? middle_->radius : 0, progress);
+}
+
 Result<SurfacePoint> ThermalScene::surface_at(const PosedView& view, const Eigen::Vector2d& pixel,
                                               const Progress& progress) const {
-  const std::string where = fmt::format("pixel {:g},{:g} of {}", pixel.x(), pixel.y(), view.name);
+  ORBITFUSE_ASSIGN(const std::string where, pixel_words(view, pixel));
   const Camera& camera = view.camera;
-  if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width &&
-        pixel.y() <= camera.height))
-    return fail(
-        ErrorKind::input, where, "outside of the picture",
-        fmt::format("choose u within 0..{} and v within 0..{}", camera.width, camera.height));
   // The same rays whatever the resolution of the view; no narrower a camera than there may be.
   constexpr double narrowest = 100;  // focal lengths per width
   const double step = std::max(static_cast<double>(camera.width) / window_of_width,

@@ -12,6 +12,7 @@
 #include "core/geometry/reconstruction.hpp"
 #include "core/progress.hpp"
 #include "core/radiometry/flir_temperature.hpp"
+#include "recon/measurement/located.hpp"
 #include "recon/measurement/options.hpp"
 
 // What measurements read: the trained thermal field and every recorded thermal frame, in one world.
@@ -44,6 +45,8 @@ struct SceneParts {
   std::vector<std::string> unposed = {};
   std::vector<PosedView>
       orbit;  ///< cameras that say where the object is (recon/assembly/looked_at)
+  /// Where distances begin and end; without a renderer: the thermal field and its sure frames.
+  SurfaceSource surface = {};
   std::optional<double> metres_per_unit;  ///< none: the run's scale is unknown
   double scale_relative_sigma = 0;        ///< of metres_per_unit
   std::string identity;                   ///< of poses, fields and session; empty: not known
@@ -103,6 +106,15 @@ class ThermalScene {
   /// the pixel lies outside the picture.
   Result<SurfacePoint> surface_at(const PosedView& view, const Eigen::Vector2d& pixel,
                                   const Progress& progress) const;
+  /// Where a distance ends: of SceneParts::surface, by all views. Errors: as surface_at(), and a
+  /// point outside of the scene.
+  Result<Located> locate(const PosedView& view, const Eigen::Vector2d& pixel,
+                         const Progress& progress) const {
+    return located(parts_.surface, view, pixel, progress);
+  }
+  Result<Located> locate(const Eigen::Vector3d& point, const Progress& progress) const;
+  /// Input error for points of no scene: farther off than its surroundings, and in no picture.
+  Status check_within(const Eigen::Vector3d& point) const;
 
  private:
   struct Cached;

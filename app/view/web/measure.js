@@ -192,7 +192,7 @@ class Measuring {
   words(m) {
     const a = m.answer;
     if (a.kind === "difference") return `${shownDifference(a.difference_k)}${a.uncertainty_k === null ? "" : " ± " + shownDifference(a.uncertainty_k)}`;
-    if (a.kind === "distance") return a.distance_m === null ? `${a.distance.toFixed(3)} units: the run's scale is not known` : `${a.distance_m.toFixed(3)} m${a.distance_uncertainty_m == null ? "" : " ± " + a.distance_uncertainty_m.toFixed(3)}`;
+    if (a.kind === "distance") return a.distance_m === null ? `${a.distance.toFixed(3)}${a.distance_uncertainty == null ? "" : " ± " + a.distance_uncertainty.toFixed(3)} units: the run's scale is not known` : `${a.distance_m.toFixed(3)} m${a.distance_uncertainty_m == null ? "" : " ± " + a.distance_uncertainty_m.toFixed(3)}`;
     if (a.spots) return a.spots.map(s => this.readingWords(s)).join("\n");
     return this.readingWords(a.reading);
   }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // `orbitfuse export --dataset` on a small run of the real program: what other programs would read.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -145,6 +146,30 @@ TEST(ExportDataset, RecordedAndNewPairsAreReadBackInEveryLayout) {
   EXPECT_THAT(mixed.err, HasSubstr("was made of an earlier train_visible"));
   EXPECT_THAT(orbitfuse_program({"inspect", out.string()}).err,
               HasSubstr("was made of an earlier train_visible"));
+}
+
+TEST(ExportScale, ADistanceIsMeasuredAsItWasTold) {
+  const test::TempFolder temp;
+  const fs::path out = temp / "out";
+  copy_results(made_run(), out);
+  const auto model = read_colmap_model(out / "poses_visible/model", Modality::visible);
+  ASSERT_TRUE(model) << model.error().message();
+  const PosedView& view = model->views.front();
+  const auto place = [&](double share) {
+    return fmt::format("{},{:.0f},{}", view.name, share * view.camera.width,
+                       view.camera.height / 2);
+  };
+  const std::string a = place(0.42), b = place(0.58);
+  const Outcome told = orbitfuse_program({"export", out.string(), "--to", (temp / "s.ply").string(),
+                                          "--distance", a, b, "1.20m", "--triangles", "2000"});
+  ASSERT_EQ(told.code, 0) << told.err;
+  const Outcome measured =
+      orbitfuse_program({"measure", out.string(), "--distance", a, b, "--json"});
+  ASSERT_EQ(measured.code, 0) << measured.err;
+  const json answer = measured.result()["answer"];
+  EXPECT_NEAR(answer["distance_m"].get<double>(), 1.2, 1e-6);
+  EXPECT_GT(answer["distance_uncertainty"].get<double>(), 0);
+  EXPECT_GT(answer["distance_uncertainty_m"].get<double>(), 0);
 }
 
 }  // namespace

@@ -559,14 +559,20 @@ TEST(Measure, DifferenceAndDistanceOfTwo) {
   EXPECT_NEAR(unscaled.distance, 0.1, 1e-9);
   EXPECT_FALSE(unscaled.distance_m);
   EXPECT_THAT(unscaled.notes.at(0), HasSubstr("no scale"));
-  EXPECT_EQ(distance_words(unscaled), "0.1000 units of the run");
+  // Two points, each as far off as a reading is: .2 % of the orbit's radius.
+  const double units = 1.645 * std::hypot(0.004, 0.004);
+  EXPECT_NEAR(unscaled.distance_uncertainty, units, 1e-4);
+  EXPECT_THAT(distance_words(unscaled), HasSubstr("0.1000 units of the run +- 0.009"));
   parts.metres_per_unit = 2.5;
   parts.scale_relative_sigma = 0.02;
   const Answer scaled = ask(box_orbit(std::move(parts)), request);
   EXPECT_NEAR(scaled.distance_m.value_or(0), 0.25, 1e-9);
-  EXPECT_NEAR(scaled.distance_uncertainty_m, 1.645 * 0.02 * 0.25, 1e-9);
-  EXPECT_EQ(distance_words(scaled), "0.250 m +- 0.008");
-  EXPECT_NEAR(to_json(scaled).at("distance_uncertainty_m").get<double>(), 0.008225, 1e-6);
+  EXPECT_NEAR(scaled.distance_uncertainty_m, std::hypot(1.645 * 0.02 * 0.25, 2.5 * units), 2e-4);
+  EXPECT_EQ(distance_words(scaled), "0.250 m +- 0.025");
+  const auto again = answer_of_json(to_json(scaled));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->distance_uncertainty, scaled.distance_uncertainty);
+  EXPECT_EQ(again->distance_uncertainty_m, scaled.distance_uncertainty_m);
 }
 
 TEST(Measure, WhatIsKeptNamesPointsNotPixels) {
