@@ -141,7 +141,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 24;  // every view is asked whether its matches hold it elsewhere
+  stage.version = 25;  // features of affine shapes where views are missing
   if (!visible) {
     stage.version = 30;  // without photos in doubt
     stage.uses = {"poses_visible"};

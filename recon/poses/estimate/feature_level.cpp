@@ -13,10 +13,11 @@ Result<FeatureLevel> FeatureLevel::extract(const Session& session,
                                            const std::vector<const FrameRecord*>& frames,
                                            const PoseOptions& options,
                                            const std::filesystem::path& folder,
-                                           const Progress& progress, double peak_threshold) {
+                                           const Progress& progress, const FeatureKind& kind) {
   ProxyOptions proxies;
   proxies.max_side_px = options.max_image_side_px;
-  ColmapOptions engine{options.colmap, options.seed, options.max_features, peak_threshold};
+  ColmapOptions engine{options.colmap, options.seed, options.max_features, kind.peak_threshold,
+                       kind.affine_shapes};
   FeatureLevel level(session, options);
   level.images_folder_ = folder / "images";
   ORBITFUSE_ASSIGN(level.images_,

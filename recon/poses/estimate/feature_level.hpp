@@ -13,6 +13,12 @@
 
 namespace orbitfuse {
 
+/// Of what kind features are.
+struct FeatureKind {
+  double peak_threshold = ColmapOptions{}.peak_threshold;
+  bool affine_shapes = false;
+};
+
 /// Features of some frames at one size, and the pairs matched so far. Errors of all: unavailable
 /// (no COLMAP), input (a photo), quality (nothing to match), cancelled.
 class FeatureLevel {
@@ -21,7 +27,7 @@ class FeatureLevel {
                                       const std::vector<const FrameRecord*>& frames,
                                       const PoseOptions& options,
                                       const std::filesystem::path& folder, const Progress& progress,
-                                      double peak_threshold = ColmapOptions{}.peak_threshold);
+                                      const FeatureKind& kind = {});
 
   /// Those of `pairs` that were not matched before.
   Status match(const std::vector<ViewPair>& pairs, const Progress& progress);

@@ -36,6 +36,9 @@ constexpr double faint_peak_threshold = 0.0025;
 /// to this many views, of more as many pairs as these have.
 constexpr int max_exhaustive_views = 60;
 constexpr std::size_t most_pairs = max_exhaustive_views * (max_exhaustive_views - 1) / 2;
+/// Features of affine shapes take two CPU seconds a view and their matches as much again: for a
+/// single view of 24 they aren't sought.
+constexpr double share_worth_affine_shapes = 0.05;
 
 constexpr const char* featureless_why =
     "shows nothing to match (blank, out of focus or overexposed?)";
@@ -102,7 +105,7 @@ class VisibleLadder {
     tell(0, "features of faint texture");
     ORBITFUSE_ASSIGN(FeatureLevel faint,
                      FeatureLevel::extract(session_, frames_, options_, workdir_ / "faint",
-                                           progress_, faint_peak_threshold));
+                                           progress_, {.peak_threshold = faint_peak_threshold}));
     ORBITFUSE_TRY(look_at_features(faint));
     tell(1, "matches of the orbit's pairs");
     ORBITFUSE_TRY(faint.match(orbit, progress_));
@@ -114,10 +117,12 @@ class VisibleLadder {
   /// What further attempts add.
   Status improve(FeatureLevel& quick, bool all_are_few) {
     const auto attempted = [&]() -> Status {
-      if (selection_.has_best())
-        ORBITFUSE_TRY(try_resection(quick, "resection on the quick model"));
+      if (selection_.has_best() || selection_.part())
+        ORBITFUSE_TRY(try_resection(quick, selection_.has_best() ? "resection on the quick model"
+                                                                 : "resection on part of a model"));
       if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(quick));
       if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
+      if (!complete()) ORBITFUSE_TRY(try_affine_features());
       return {};
     };
     return spared(attempted());
@@ -363,6 +368,8 @@ class VisibleLadder {
       ORBITFUSE_ASSIGN(Reconstruction model, level.map({}, progress_));
       selection_.consider("COLMAP, " + name, level.found(), std::move(model), level);
     }
+    if (!selection_.has_best() && selection_.part())
+      return try_resection(level, "resection on part of a model, " + name);
     if (selection_.has_best() && !complete())
       ORBITFUSE_TRY(try_resection(level, "resection, COLMAP, " + name));
     return {};
@@ -380,6 +387,29 @@ class VisibleLadder {
     tell(1, "matches at full settings");
     ORBITFUSE_TRY(full_->match(pairs, progress_));
     return map_and_resect(*full_, "full settings");
+  }
+
+  /// What looks too different from one view to the next: patches are compared in the shapes that
+  /// they have from each.
+  Status try_affine_features() {
+    if (total_ > max_exhaustive_views ||
+        static_cast<double>(missing().size()) < share_worth_affine_shapes * total_)
+      return {};
+    tell(0, "features of affine shapes");
+    auto found =
+        FeatureLevel::extract(session_, frames_, options_, workdir_ / "affine", progress_,
+                              {.peak_threshold = faint_peak_threshold, .affine_shapes = true});
+    if (!found && found.error().kind == ErrorKind::cancelled) return tl::unexpected(found.error());
+    if (!found) {  // what the attempts before it say stands
+      selection_.note_fallen("COLMAP, affine shapes", found.error().found);
+      return {};
+    }
+    affine_ = *std::move(found);
+    tell(1, "matches of affine shapes");
+    ORBITFUSE_TRY(affine_->match(exhaustive_pairs(total_), progress_));
+    const bool had_one = selection_.has_best();
+    ORBITFUSE_TRY(map_and_resect(*affine_, "affine shapes"));
+    return had_one && !complete() ? try_global(*affine_, "affine shapes") : Status{};
   }
 
   Status doubt_placed_elsewhere(ModalityPoses& poses) const {
@@ -433,7 +463,7 @@ class VisibleLadder {
   std::set<std::string> featureless_;
   bool rematched_ = false;  ///< the best model's points are those along its epipolar lines
   bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
-  std::optional<FeatureLevel> faint_, full_;
+  std::optional<FeatureLevel> faint_, full_, affine_;
 };
 
 }  // namespace

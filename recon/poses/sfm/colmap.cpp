@@ -50,6 +50,14 @@ void restore_frames(Reconstruction& model, const std::vector<ProxyImage>& images
           observation.pixel.cwiseProduct(scale[static_cast<std::size_t>(observation.view)]);
 }
 
+void append(const SiftFeatures& more, SiftFeatures& features) {
+  features.keypoints.insert(features.keypoints.end(), more.keypoints.begin(), more.keypoints.end());
+  SiftFeatures::Bytes all(features.descriptors.rows() + more.descriptors.rows(),
+                          Eigen::Index{SiftFeatures::Bytes::ColsAtCompileTime});
+  all << features.descriptors, more.descriptors;
+  features.descriptors = std::move(all);
+}
+
 std::string flag(bool on) { return on ? "1" : "0"; }
 
 }  // namespace
@@ -177,11 +185,43 @@ Result<std::map<std::string, SiftFeatures>> ColmapProject::find_features(
   return features;
 }
 
+Result<std::map<std::string, SiftFeatures>> ColmapProject::find_affine_features(
+    const Progress& progress) const {
+  const fs::path found = folder_ / "affine.db";
+  ORBITFUSE_TRY(
+      run({"feature_extractor", "--random_seed", fmt::format("{}", options_.seed % 2147483647u),
+           "--database_path", found.string(), "--image_path", image_folder_.string(),
+           "--SiftExtraction.use_gpu", "0", "--SiftExtraction.estimate_affine_shape", "1",
+           "--SiftExtraction.domain_size_pooling", "1", "--SiftExtraction.max_num_features",
+           fmt::format("{}", options_.max_features), "--SiftExtraction.peak_threshold",
+           fmt::format("{}", options_.peak_threshold)},
+          progress));
+  ORBITFUSE_ASSIGN(const auto places, read_keypoints(found).map_error(with_last_words(folder_)));
+  ORBITFUSE_ASSIGN(const auto descriptors, read_descriptors(found));
+  std::map<std::string, SiftFeatures> features;
+  for (const auto& [name, pixels] : places) {
+    const auto described = descriptors.find(name);
+    if (described == descriptors.end() || described->second.rows() != pixels.cols())
+      return fail(ErrorKind::input, found.string(), "features that are not described",
+                  "run the pose stage again");
+    SiftFeatures& image = features[name];
+    for (Eigen::Index i = 0; i < pixels.cols(); ++i)
+      image.keypoints.push_back(
+          {static_cast<float>(pixels(0, i)), static_cast<float>(pixels(1, i)), 1, 0});
+    image.descriptors = described->second.cast<std::uint8_t>();
+  }
+  return features;
+}
+
 Result<DatabaseCounts> ColmapProject::extract(const Session& session,
                                               const std::vector<ProxyImage>& images,
                                               const Progress& progress) {
   ORBITFUSE_TRY(enter_images(session, images, progress));
-  ORBITFUSE_ASSIGN(const auto features, find_features(images, progress));
+  ORBITFUSE_ASSIGN(auto features, find_features(images, progress));
+  if (options_.affine_shapes) {
+    ORBITFUSE_ASSIGN(const auto affine, find_affine_features(progress));
+    for (const auto& [name, more] : affine) append(more, features[name]);
+  }
   ORBITFUSE_TRY(write_features(database_, features).map_error(with_last_words(folder_)));
   ORBITFUSE_ASSIGN(const DatabaseCounts counts,
                    count_database(database_).map_error(with_last_words(folder_)));
