@@ -101,6 +101,11 @@ Result<MetricScale> scale_of_distance(const view::FinishedRun& run, const Place&
   for (const auto& [place, found] : {std::pair(&from, &a), std::pair(&to, &b)})
     if (std::holds_alternative<Eigen::Vector3d>(*place))
       scale.how += fmt::format("; a typed point counts as {:.4f} units off", found->across);
+  for (const view::RecordedView& v : run.views)
+    for (const Place* place : {&from, &to})
+      if (const auto* pixel = std::get_if<PixelPlace>(place);
+          pixel != nullptr && pixel->view == v.view.name && v.doubt)
+        scale.how += "; the pose of " + pixel->view + " is in doubt";
   ORBITFUSE_TRY(scale.validate("--distance"));
   return scale;
 }

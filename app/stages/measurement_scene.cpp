@@ -34,7 +34,6 @@ Status add_thermal(const pipeline::StageContext& context, const Session& session
   ORBITFUSE_ASSIGN(const Similarity3d world_from_thermal, load_world_from_thermal(context));
   const auto shared = std::make_shared<const nerf::Field>(std::move(field));
   parts.field = measurement::field_renderer(shared, world_from_thermal);
-  parts.surface.depth = measurement::surface_renderer(shared, world_from_thermal);
   ORBITFUSE_ASSIGN(const Reconstruction model, load_trained_poses(context, Modality::thermal));
   ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_thermal")));
   for (PosedView view : model.views) {
@@ -52,8 +51,10 @@ Status add_thermal(const pipeline::StageContext& context, const Session& session
                   "a posed view that is no thermal frame of " + session.folder.string(),
                   "name the session of that run, or run this one again");
     frame.radiometry = record->radiometry;
+    if (!frame.doubtful()) parts.surface.views.push_back(frame.view);
     parts.frames.push_back(std::move(frame));
   }
+  parts.surface.depth = measurement::surface_renderer(shared, world_from_thermal);
   ORBITFUSE_ASSIGN(const TrainedFrames trained, load_trained_frames(context.of("train_thermal")));
   parts.read_frame = [root = session.folder,
                       shading_k = trained.shading_k](const ThermalFrame& frame) -> Result<cv::Mat> {
@@ -67,8 +68,6 @@ Status add_thermal(const pipeline::StageContext& context, const Session& session
 /// The visible field's surface in place of the thermal one's, which has no fine form. It is read
 /// when the first distance is asked for.
 Status add_visible_surface(const pipeline::StageContext& context, SceneParts& parts) {
-  for (const ThermalFrame& frame : parts.frames)
-    if (!frame.doubtful()) parts.surface.views.push_back(frame.view);
   if (!is_in_visible_world(context) || !context.has("train_visible")) return {};
   struct Loaded {
     std::once_flag once;
@@ -98,9 +97,14 @@ Status add_visible_surface(const pipeline::StageContext& context, SceneParts& pa
 Status add_named_views(const pipeline::StageContext& context, SceneParts& parts) {
   for (const ThermalFrame& frame : parts.frames) parts.orbit.push_back(frame.view);
   if (context.has("poses_visible")) {
+    // Those that the field was trained with: its depth is along their rays.
     ORBITFUSE_ASSIGN(const Reconstruction visible,
-                     load_poses(context.of("poses_visible"), Modality::visible));
+                     context.has("train_visible")
+                         ? load_trained_poses(context, Modality::visible)
+                         : load_poses(context.of("poses_visible"), Modality::visible));
     parts.views = parts.orbit = visible.views;
+    ORBITFUSE_ASSIGN(const auto doubts, load_doubts(context.of("poses_visible")));
+    for (const auto& [view, why] : doubts) parts.doubtful_views.insert(view);
   }
   if (!context.has("render")) return {};
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));

@@ -14,6 +14,9 @@ namespace orbitfuse::measurement {
 inline constexpr double sigmas_of_90_percent = 1.645;
 inline constexpr const char* no_scale_note = "no scale: the run doesn't know its unit in metres";
 
+inline constexpr const char* ends_unknown_note =
+    "+- is of the scale alone: an earlier version saved it; measure it again for that of its ends";
+
 inline constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
 
 /// What one original frame says of a spot or region. Kelvin; of a spot mean = min = max.

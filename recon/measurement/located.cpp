@@ -64,7 +64,9 @@ bool in_picture(const PosedView& view, const Eigen::Vector3d& in_cam) {
 
 /// What the depths of other views say of a point, those in `order` first.
 struct OtherViews {
-  double farther = 0;      ///< along the ray, middle of all views, the point's own among them
+  /// The middle of all views, the point's own (0) among them; each along its own axis, taken for
+  /// what it is along the point's ray: views from far aside are not asked.
+  double farther = 0;
   double off = 0;          ///< three quarters of them are off by no more
   std::size_t number = 0;  ///< that see it
 };
@@ -122,10 +124,13 @@ double Located::variance_along(const Eigen::Vector3d& direction) const {
 Apart apart(const Located& a, const Located& b) {
   const Eigen::Vector3d between = b.position - a.position;
   const double length = between.norm();
-  if (!(length > 0))
-    return {0, std::hypot(std::max(a.across, a.along), std::max(b.across, b.along))};
-  const Eigen::Vector3d direction = between / length;
-  return {length, std::sqrt(a.variance_along(direction) + b.variance_along(direction))};
+  const Eigen::Vector3d direction =
+      length > 0 ? Eigen::Vector3d(between / length) : Eigen::Vector3d::UnitX();
+  const auto all = [](const Located& p) { return 2 * p.across * p.across + p.along * p.along; };
+  const double in_line = a.variance_along(direction) + b.variance_along(direction);
+  const double beside = std::max(all(a) + all(b) - in_line, 0.0);
+  // What lies beside a line that is not much longer makes it longer too.
+  return {length, std::hypot(std::sqrt(in_line), std::sqrt(length * length + beside) - length)};
 }
 
 Result<std::string> pixel_words(const PosedView& view, const Eigen::Vector2d& pixel) {
@@ -159,6 +164,7 @@ Result<Located> located(const SurfaceSource& source, const PosedView& view,
   out.position += others.farther * out.ray;
   out.along = std::max(out.along, others.number < least_others ? unconfirmed_share * seen->z
                                                                : off_weight * others.off);
+  out.confirmed = others.number >= least_others;
   return out;
 }
 
@@ -173,8 +179,10 @@ Result<Located> located(const SurfaceSource& source, const Eigen::Vector3d& poin
                    [&](const PosedView* a, const PosedView* b) { return far(a) < far(b); });
   ORBITFUSE_ASSIGN(const OtherViews others,
                    other_views(source.depth, order, point, /*looks_past=*/false, progress));
-  const double off = std::max(point_share * radius, off_weight * others.off);
-  return Located{point, Eigen::Vector3d::UnitZ(), off, off};
+  // The greater one of those that are known.
+  const double off =
+      std::fmax(point_share * radius, others.number > 0 ? off_weight * others.off : std::nan(""));
+  return Located{point, Eigen::Vector3d::UnitZ(), off, off, others.number >= least_others};
 }
 
 }  // namespace orbitfuse::measurement

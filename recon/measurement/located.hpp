@@ -31,6 +31,7 @@ struct SurfaceSource {
 struct Located {
   Eigen::Vector3d position = Eigen::Vector3d::Zero(), ray = Eigen::Vector3d::UnitZ();
   double across = 0, along = 0;
+  bool confirmed = true;  ///< by a surface that two other views or more have there
   double variance_along(const Eigen::Vector3d& direction) const;
 };
 
@@ -46,8 +47,8 @@ Result<Located> located(const SurfaceSource& source, const PosedView& view,
                         const Eigen::Vector2d& pixel, const Progress& progress);
 
 /// A point as it was given, as far off as the views that see a surface there are apart, and no
-/// less than a share of the orbit's radius: it was read off a picture or a model. Errors: the
-/// renderer's.
+/// less than a share of the orbit's radius (NaN: not known how far): it was read off a picture or a
+/// model. Errors: the renderer's.
 Result<Located> located(const SurfaceSource& source, const Eigen::Vector3d& point, double radius,
                         const Progress& progress);
 

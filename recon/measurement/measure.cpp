@@ -317,6 +317,17 @@ Result<Answer> measure_distance(const ThermalScene& scene, const Request& reques
   Answer answer;
   ORBITFUSE_ASSIGN(const Located a, locate(scene, request.places[0], progress));
   ORBITFUSE_ASSIGN(const Located b, locate(scene, request.places[1], progress));
+  for (const auto& [place, found] :
+       {std::pair(&request.places[0], &a), std::pair(&request.places[1], &b)}) {
+    const std::string end = place == &request.places[0] ? "its first end" : "its second end";
+    if (!found->confirmed)
+      answer.notes.push_back("fewer than two other views show a surface at " + end);
+    if (const auto* pixel = std::get_if<PixelPlace>(place);
+        pixel != nullptr && scene.is_doubtful(pixel->view))
+      answer.notes.push_back(
+          fmt::format("{} is a pixel of {}, whose pose is in doubt: it may be another place", end,
+                      pixel->view));
+  }
   const Apart between = apart(a, b);
   answer.distance = between.length;
   answer.distance_uncertainty = sigmas_of_90_percent * between.sigma;

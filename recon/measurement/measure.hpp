@@ -13,7 +13,8 @@ namespace orbitfuse::measurement {
 Result<Answer> measure(const ThermalScene& scene, const Request& request, const Progress& progress);
 
 /// The request to keep: pixels of spots, lines and distances become the points that they showed,
-/// because a view's name may stand for another camera when the run renders anew. Polygons stay.
+/// because a view's name may stand for another camera when the run renders anew. Polygons stay. A
+/// distance between kept points is the same; it is as sure as points are, not as its pixels were.
 Request anchored(Request request, const Answer& answer);
 
 /// A measurement to keep: the anchored() request, and what it answers. Of spots that is not quite

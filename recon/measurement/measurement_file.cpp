@@ -186,16 +186,17 @@ void bring_to_scale(Measurements& saved, std::optional<double> metres_per_unit,
     json notes = json::array();
     if (const auto said = m.answer.find("notes"); said != m.answer.end() && said->is_array())
       for (const json& note : *said)
-        if (note != no_scale_note) notes.push_back(note);
+        if (note != no_scale_note && note != ends_unknown_note) notes.push_back(note);
     if (!metres_per_unit) notes.push_back(no_scale_note);
     m.answer["notes"] = notes;
     if (!metres_per_unit) continue;
     const auto uncertain = m.answer.find("distance_uncertainty");
+    const bool ends_known = uncertain != m.answer.end() && uncertain->is_number();
+    if (!ends_known) m.answer["notes"].push_back(ends_unknown_note);
     m.answer["distance_m"] = units->get<double>() * *metres_per_unit;
     m.answer["distance_uncertainty_m"] = distance_uncertainty_m(
-        units->get<double>(),
-        uncertain != m.answer.end() && uncertain->is_number() ? uncertain->get<double>() : unknown,
-        *metres_per_unit, relative_sigma);
+        units->get<double>(), ends_known ? uncertain->get<double>() : unknown, *metres_per_unit,
+        relative_sigma);
   }
 }
 

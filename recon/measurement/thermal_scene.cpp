@@ -133,6 +133,13 @@ Result<ThermalScene> ThermalScene::make(SceneParts parts, const MeasurementOptio
   return ThermalScene(std::move(parts), options);
 }
 
+bool ThermalScene::is_doubtful(const std::string& view) const {
+  return parts_.doubtful_views.contains(view) ||
+         std::any_of(parts_.frames.begin(), parts_.frames.end(), [&](const ThermalFrame& frame) {
+           return frame.doubtful() && frame.view.name == view;
+         });
+}
+
 bool ThermalScene::has_view(const std::string& name) const { return view(name).has_value(); }
 
 Result<const PosedView*> ThermalScene::view(const std::string& name) const {
@@ -203,7 +210,8 @@ Status ThermalScene::check_within(const Eigen::Vector3d& point) const {
 
 Result<Located> ThermalScene::locate(const Eigen::Vector3d& point, const Progress& progress) const {
   ORBITFUSE_TRY(check_within(point));
-  return located(parts_.surface, point, middle_ ? middle_->radius : 0, progress);
+  constexpr double not_known = std::numeric_limits<double>::quiet_NaN();
+  return located(parts_.surface, point, middle_ ? middle_->radius : not_known, progress);
 }
 
 Result<SurfacePoint> ThermalScene::surface_at(const PosedView& view, const Eigen::Vector2d& pixel,

@@ -6,6 +6,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -41,6 +42,7 @@ struct SceneParts {
   /// Kelvin of frames[i], CV_32FC1 of its camera's size, NaN = dead pixel.
   std::function<Result<cv::Mat>(const ThermalFrame&)> read_frame;
   std::vector<PosedView> views;  ///< others that a pixel may be given in: rendered, visible
+  std::set<std::string> doubtful_views = {};  ///< of these, such whose pose may be wrong
   /// Frames of the session that have no pose, so that nothing can be measured in them.
   std::vector<std::string> unposed = {};
   std::vector<PosedView>
@@ -90,6 +92,8 @@ class ThermalScene {
   /// A view by its name: thermal frames, then `views`. Input error with names that are alike.
   Result<const PosedView*> view(const std::string& name) const;
   bool has_view(const std::string& name) const;
+  /// Its pose may be wrong, so that its pixels may show other places.
+  bool is_doubtful(const std::string& view) const;
 
   /// CV_32FC1 kelvin of a frame. Errors: read_frame's, input (not of the camera's size).
   Result<cv::Mat> image(std::size_t frame) const;

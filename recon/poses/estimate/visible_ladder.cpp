@@ -36,8 +36,8 @@ constexpr double faint_peak_threshold = 0.0025;
 /// to this many views, of more as many pairs as these have.
 constexpr int max_exhaustive_views = 60;
 constexpr std::size_t most_pairs = max_exhaustive_views * (max_exhaustive_views - 1) / 2;
-/// Features of affine shapes take two CPU seconds a view and their matches as much again: for a
-/// single view of 24 they aren't sought.
+/// Features of affine shapes take two CPU seconds a view and half a one a pair: for a single view
+/// of 24 they aren't sought.
 constexpr double share_worth_affine_shapes = 0.05;
 
 constexpr const char* featureless_why =
@@ -96,7 +96,7 @@ class VisibleLadder {
             spared(try_resection(selection_.best_level(), "resection on points matched again")));
     }
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_alignment()));
-    return answer(level.pairs());
+    return answer();
   }
 
  private:
@@ -392,9 +392,16 @@ class VisibleLadder {
   /// What looks too different from one view to the next: patches are compared in the shapes that
   /// they have from each.
   Status try_affine_features() {
-    if (total_ > max_exhaustive_views ||
-        static_cast<double>(missing().size()) < share_worth_affine_shapes * total_)
+    if (static_cast<double>(missing().size()) < share_worth_affine_shapes * total_) return {};
+    if (total_ > max_exhaustive_views) {
+      selection_.note_fallen("COLMAP, affine shapes",
+                             fmt::format("not sought of {} views, {} at most: their pairs take too "
+                                         "long",
+                                         total_, max_exhaustive_views));
       return {};
+    }
+    // What stands without them isn't given up for a larger model of theirs that is contradicted.
+    selection_.take_part();
     tell(0, "features of affine shapes");
     auto found =
         FeatureLevel::extract(session_, frames_, options_, workdir_ / "affine", progress_,
@@ -407,9 +414,13 @@ class VisibleLadder {
     affine_ = *std::move(found);
     tell(1, "matches of affine shapes");
     ORBITFUSE_TRY(affine_->match(exhaustive_pairs(total_), progress_));
-    const bool had_one = selection_.has_best();
     ORBITFUSE_TRY(map_and_resect(*affine_, "affine shapes"));
-    return had_one && !complete() ? try_global(*affine_, "affine shapes") : Status{};
+    // COLMAP's mapper leaves views out that the global one places.
+    const bool asked = std::any_of(steps_.begin(), steps_.end(), [](const LadderStep& step) {
+      return step.attempt == "global mapper, affine shapes";
+    });
+    return asked || !selection_.has_best() || complete() ? Status{}
+                                                         : try_global(*affine_, "affine shapes");
   }
 
   Status doubt_placed_elsewhere(ModalityPoses& poses) const {
@@ -420,7 +431,7 @@ class VisibleLadder {
     return {};
   }
 
-  Result<ModalityPoses> answer(int pairs) {
+  Result<ModalityPoses> answer() {
     if (!selection_.has_best()) {
       auto error = none_held(steps_, Modality::visible, workdir_);
       for (const std::string& file : featureless_)
@@ -443,7 +454,8 @@ class VisibleLadder {
           "stations agree with these, and no attempt placed more",
           poses.reconstruction.views.size(), total_, 100 * options_.min_posed_ratio));
     ORBITFUSE_TRY(spared(doubt_placed_elsewhere(poses)));
-    const auto all = static_cast<int>(exhaustive_pairs(total_).size());
+    const auto all = static_cast<int>(exhaustive_pairs(total_).size()),
+               pairs = selection_.best_level().pairs();
     if (pairs < all)
       poses.skips.push_back({"exhaustive matching", fmt::format("{} of {} pairs held", pairs, all),
                              fmt::format("{:.1f}x fewer pairs to match",

@@ -186,17 +186,23 @@ Result<std::map<std::string, SiftFeatures>> ColmapProject::find_features(
 }
 
 Result<std::map<std::string, SiftFeatures>> ColmapProject::find_affine_features(
-    const Progress& progress) const {
+    std::size_t images, const Progress& progress) const {
   const fs::path found = folder_ / "affine.db";
   ORBITFUSE_TRY(
       run({"feature_extractor", "--random_seed", fmt::format("{}", options_.seed % 2147483647u),
            "--database_path", found.string(), "--image_path", image_folder_.string(),
+           "--SiftExtraction.num_threads", fmt::format("{}", thread_count()),
            "--SiftExtraction.use_gpu", "0", "--SiftExtraction.estimate_affine_shape", "1",
            "--SiftExtraction.domain_size_pooling", "1", "--SiftExtraction.max_num_features",
            fmt::format("{}", options_.max_features), "--SiftExtraction.peak_threshold",
            fmt::format("{}", options_.peak_threshold)},
           progress));
   ORBITFUSE_ASSIGN(const auto places, read_keypoints(found).map_error(with_last_words(folder_)));
+  if (places.size() != images)
+    return tl::unexpected(with_last_words(folder_)(
+        Error{ErrorKind::input, found.string(),
+              fmt::format("COLMAP has described {} of {} images", places.size(), images),
+              "see colmap.log beside it"}));
   ORBITFUSE_ASSIGN(const auto descriptors, read_descriptors(found));
   std::map<std::string, SiftFeatures> features;
   for (const auto& [name, pixels] : places) {
@@ -219,7 +225,7 @@ Result<DatabaseCounts> ColmapProject::extract(const Session& session,
   ORBITFUSE_TRY(enter_images(session, images, progress));
   ORBITFUSE_ASSIGN(auto features, find_features(images, progress));
   if (options_.affine_shapes) {
-    ORBITFUSE_ASSIGN(const auto affine, find_affine_features(progress));
+    ORBITFUSE_ASSIGN(const auto affine, find_affine_features(images.size(), progress));
     for (const auto& [name, more] : affine) append(more, features[name]);
   }
   ORBITFUSE_TRY(write_features(database_, features).map_error(with_last_words(folder_)));

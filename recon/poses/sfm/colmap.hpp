@@ -72,7 +72,8 @@ class ColmapProject {
                       const Progress& progress);
   Result<std::map<std::string, SiftFeatures>> find_features(const std::vector<ProxyImage>& images,
                                                             const Progress& progress) const;
-  Result<std::map<std::string, SiftFeatures>> find_affine_features(const Progress& progress) const;
+  Result<std::map<std::string, SiftFeatures>> find_affine_features(std::size_t images,
+                                                                   const Progress& progress) const;
   Status run(std::vector<std::string> arguments, const Progress& progress) const;
   std::vector<std::string> seed_and(const std::string& verb) const;
 

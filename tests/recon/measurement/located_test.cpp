@@ -73,6 +73,9 @@ TEST(Located, APointIsKeptAndAsUnsureAsTheViewsAreApart) {
   // In the air, where no view has a surface, and before any view is known: what a reading costs.
   EXPECT_DOUBLE_EQ(located(even, {0, 0, 1.2}, 2, {})->along, 0.004);
   EXPECT_DOUBLE_EQ(located({even.depth, {}}, point, 2, {})->along, 0.004);
+  EXPECT_TRUE(sure->confirmed);
+  EXPECT_FALSE(located(even, {0, 0, 1.2}, 2, {})->confirmed);
+  EXPECT_TRUE(std::isnan(located(even, {0, 0, 1.2}, std::nan(""), {})->along));
 }
 
 TEST(Located, WhatIsNoPlaceIsNamed) {
@@ -93,11 +96,14 @@ TEST(Located, WhatIsNoPlaceIsNamed) {
 TEST(Located, ADistanceIsAsUnsureAsItsEnds) {
   const Located a{{0, 0, 0}, {1, 0, 0}, 0.01, 0.1}, b{{0, 2, 0}, {1, 0, 0}, 0.02, 0.1};
   EXPECT_DOUBLE_EQ(apart(a, b).length, 2);
-  EXPECT_DOUBLE_EQ(apart(a, b).sigma, std::hypot(0.01, 0.02));  // across both rays
+  EXPECT_NEAR(apart(a, b).sigma, std::hypot(0.01, 0.02), 1e-3);  // across both rays
   const Located behind{{3, 0, 0}, {1, 0, 0}, 0.02, 0.1};
-  EXPECT_DOUBLE_EQ(apart(a, behind).sigma, std::hypot(0.1, 0.1));
+  EXPECT_NEAR(apart(a, behind).sigma, std::hypot(0.1, 0.1), 1e-5);
+  // Beside a short line the ray's error counts in full, and no jump lies between.
+  const Located near{{0, 1e-6, 0}, {1, 0, 0}, 0.01, 0.1};
   EXPECT_EQ(apart(a, a).length, 0);
-  EXPECT_DOUBLE_EQ(apart(a, a).sigma, std::hypot(0.1, 0.1));
+  EXPECT_NEAR(apart(a, a).sigma, std::hypot(0.1, 0.1), 0.002);
+  EXPECT_NEAR(apart(a, near).sigma, apart(a, a).sigma, 1e-4);
 }
 
 }  // namespace

@@ -101,6 +101,7 @@ TEST_F(MeasurementFile, DistancesAreInTheMetresOfTodaysScale) {
   bring_to_scale(saved, 3.0, 0.01);
   EXPECT_DOUBLE_EQ(saved.list[0].answer["distance_m"].get<double>(), 6);
   EXPECT_NEAR(saved.list[0].answer["distance_uncertainty_m"].get<double>(), 0.06 * 1.645, 1e-12);
+  EXPECT_EQ(saved.list[0].answer["notes"], json({"another", ends_unknown_note}));
   saved.list[0].answer["distance_uncertainty"] = 0.03;  // of its ends
   bring_to_scale(saved, 3.0, 0.01);
   EXPECT_NEAR(saved.list[0].answer["distance_uncertainty_m"].get<double>(),

@@ -68,7 +68,9 @@ TEST(AffineFeatures, AreFoundAgainFromFarToTheSide) {
   const auto upright = matched(false, folder / "upright");
   if (!upright && upright.error().kind == ErrorKind::unavailable) GTEST_SKIP() << "no COLMAP";
   const auto affine = matched(true, folder / "affine"), again = matched(true, folder / "again");
-  ASSERT_TRUE(upright && affine && again) << affine.error().message();
+  ASSERT_TRUE(upright) << upright.error().message();
+  ASSERT_TRUE(affine) << affine.error().message();
+  ASSERT_TRUE(again) << again.error().message();
   EXPECT_GT(affine->features, upright->features) << "they join the others";
   EXPECT_GT(affine->right, 2 * upright->right + 20);
   EXPECT_LT(affine->wrong, affine->right / 2);
