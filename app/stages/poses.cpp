@@ -141,7 +141,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   const bool visible = modality == Modality::visible;
   pipeline::Stage stage;
   stage.name = "poses_" + std::string(name(modality));
-  stage.version = 25;  // features of affine shapes where views are missing
+  stage.version = 26;  // joints of points that three views see
   if (!visible) {
     stage.version = 30;  // without photos in doubt
     stage.uses = {"poses_visible"};

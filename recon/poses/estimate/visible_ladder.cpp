@@ -88,7 +88,7 @@ class VisibleLadder {
     if (!complete()) ORBITFUSE_TRY(improve(level, all_are_few));
     selection_.take_part();
     if (selection_.has_best() && steps_.size() > 1) ORBITFUSE_TRY(spared(try_all_matches()));
-    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_joining()));
+    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_firmer_joint()));
     if (selection_.has_best() && !complete()) {
       ORBITFUSE_TRY(spared(try_rematching()));
       if (rematched_)
@@ -122,8 +122,8 @@ class VisibleLadder {
                                                                  : "resection on part of a model"));
       if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(quick));
       if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
-      if (!complete()) ORBITFUSE_TRY(try_affine_features());
-      return {};
+      if (static_cast<double>(missing().size()) < share_worth_affine_shapes * total_) return {};
+      return try_affine_features(ModelSelection::more_views);
     };
     return spared(attempted());
   }
@@ -260,19 +260,33 @@ class VisibleLadder {
     return {};
   }
 
-  /// Two parts of the best model that few points join, on the likeliest pairs across.
-  Status try_joining() {
-    const Reconstruction& best = selection_.best();
-    const Joint joint = weakest_joint(best);
+  static bool hangs_together(const Reconstruction& now, const Reconstruction& before) {
+    return now.views.size() >= before.views.size() &&
+           weakest_joint(now).share > weakest_joint(before).share;
+  }
+
+  /// Two parts of the best model that few points join: by more pairs, then by more features.
+  Status try_firmer_joint() {
+    const Joint joint = weakest_joint(selection_.best());
     if (!joint.loose()) return {};
+    ORBITFUSE_TRY(spared(try_joining(joint)));
+    if (asked_affine_ || !weakest_joint(selection_.best()).loose()) return {};
+    ORBITFUSE_TRY(try_affine_features(hangs_together));
+    return affine_ && &selection_.best_level() == &*affine_ ? try_all_matches() : Status{};
+  }
+
+  /// On the likeliest pairs across.
+  Status try_joining(const Joint& joint) {
+    const Reconstruction& best = selection_.best();
     const std::string attempt = "pairs across a loose joint";
     tell(1, "matches of the " + attempt);
     ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
     ORBITFUSE_ASSIGN(const std::vector<ViewPair> pairs,
                      likely_pairs_across(graph, best, joint, progress_));
     const std::string found = fmt::format(
-        "{} points, {:.2f} of a view's, join {} views to the rest; {} pairs across look alike",
-        joint.points, joint.share, joint.views_beyond, pairs.size());
+        "{} points{}, {:.2f} of a view's, join {} views to the rest; {} pairs across look alike",
+        joint.points, joint.views_of_point > 2 ? " of three views" : "", joint.share,
+        joint.views_beyond, pairs.size());
     if (pairs.empty()) {
       selection_.note_fallen(attempt, found);
       return {};
@@ -280,11 +294,8 @@ class VisibleLadder {
     ORBITFUSE_TRY(selection_.best_level().match(pairs, progress_));
     tell(2, "COLMAP, " + attempt);
     ORBITFUSE_ASSIGN(Reconstruction model, selection_.best_level().map({}, progress_));
-    const Better joined = [&](const Reconstruction& now, const Reconstruction& before) {
-      return now.views.size() >= before.views.size() && weakest_joint(now).share > joint.share;
-    };
     selection_.consider("COLMAP, " + attempt, found + "; " + selection_.best_level().found(),
-                        std::move(model), selection_.best_level(), joined);
+                        std::move(model), selection_.best_level(), hangs_together);
     return {};
   }
 
@@ -360,13 +371,14 @@ class VisibleLadder {
     return map_and_resect(level, "remaining pairs");
   }
 
-  Status map_and_resect(FeatureLevel& level, const std::string& name) {
+  Status map_and_resect(FeatureLevel& level, const std::string& name,
+                        const Better& better = ModelSelection::more_views) {
     if (!selection_.has_best()) {
       ORBITFUSE_TRY(try_mapper(level, name));
     } else {
       tell(2, "COLMAP, " + name);
       ORBITFUSE_ASSIGN(Reconstruction model, level.map({}, progress_));
-      selection_.consider("COLMAP, " + name, level.found(), std::move(model), level);
+      selection_.consider("COLMAP, " + name, level.found(), std::move(model), level, better);
     }
     if (!selection_.has_best() && selection_.part())
       return try_resection(level, "resection on part of a model, " + name);
@@ -391,8 +403,8 @@ class VisibleLadder {
 
   /// What looks too different from one view to the next: patches are compared in the shapes that
   /// they have from each.
-  Status try_affine_features() {
-    if (static_cast<double>(missing().size()) < share_worth_affine_shapes * total_) return {};
+  Status try_affine_features(const Better& better) {
+    asked_affine_ = true;
     if (total_ > max_exhaustive_views) {
       selection_.note_fallen("COLMAP, affine shapes",
                              fmt::format("not sought of {} views, {} at most: their pairs take too "
@@ -414,7 +426,7 @@ class VisibleLadder {
     affine_ = *std::move(found);
     tell(1, "matches of affine shapes");
     ORBITFUSE_TRY(affine_->match(exhaustive_pairs(total_), progress_));
-    ORBITFUSE_TRY(map_and_resect(*affine_, "affine shapes"));
+    ORBITFUSE_TRY(map_and_resect(*affine_, "affine shapes", better));
     // COLMAP's mapper leaves views out that the global one places.
     const bool asked = std::any_of(steps_.begin(), steps_.end(), [](const LadderStep& step) {
       return step.attempt == "global mapper, affine shapes";
@@ -447,7 +459,15 @@ class VisibleLadder {
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
-    doubt_beyond(weakest_joint(poses.reconstruction), poses.reconstruction, poses.doubtful);
+    const Joint joint = weakest_joint(poses.reconstruction);
+    doubt_beyond(joint, poses.reconstruction, poses.doubtful);
+    // A loop that a false joint closes is bent all round.
+    if (joint.loose())
+      poses.warnings.push_back(fmt::format(
+          "{} photos hang on the others by {} points{}: should these be mistaken, they may have "
+          "bent the sure ones too; take photos between the doubtful ones and the rest",
+          joint.views_beyond, joint.points,
+          joint.views_of_point > 2 ? " that three photos see" : ""));
     if (poses.posed_ratio() < options_.min_posed_ratio)
       poses.warnings.push_back(fmt::format(
           "{} of {} photos have a place, {:.0f} % are asked for (poses.min_posed_ratio): the "
@@ -473,6 +493,7 @@ class VisibleLadder {
   const int total_;
   std::string quick_name_ = "orbit pairs";
   std::set<std::string> featureless_;
+  bool asked_affine_ = false;
   bool rematched_ = false;  ///< the best model's points are those along its epipolar lines
   bool limited_ = false;    ///< images were reduced or features cut off: full settings find others
   std::optional<FeatureLevel> faint_, full_, affine_;

@@ -65,15 +65,26 @@ std::vector<int> points_across(const Tracks& tracks, const std::vector<int>& ord
   return across;
 }
 
-void take_weakest(const Tracks& tracks, const std::vector<int>& order, double points_a_view,
+double median_points_a_view(const Tracks& tracks, int count) {
+  std::vector<double> points(at(count), 0);
+  for (const std::vector<int>& views : tracks)
+    for (const int v : views) ++points[at(v)];
+  return std::max(1.0, median(points));
+}
+
+/// Of tracks of `views_of_point` views and more.
+void take_weakest(const Tracks& tracks, int views_of_point, const std::vector<int>& order,
                   Joint& joint) {
+  if (tracks.empty()) return;  // every view is weakly held then, which says more
   const auto count = static_cast<int>(order.size());
+  const double points_a_view = median_points_a_view(tracks, count);
   const std::vector<int> across = points_across(tracks, order);
   for (int k = fewest_on_a_side; k <= count - fewest_on_a_side; ++k) {
     const double share = across[at(k)] / points_a_view;
     if (share >= joint.share) continue;
     joint.share = share;
     joint.points = across[at(k)];
+    joint.views_of_point = views_of_point;
     joint.beyond.assign(at(count), 0);
     const bool first_is_smaller = k <= count / 2;
     joint.views_beyond = first_is_smaller ? k : count - k;
@@ -82,11 +93,9 @@ void take_weakest(const Tracks& tracks, const std::vector<int>& order, double po
   }
 }
 
-double median_points_a_view(const Tracks& tracks, int count) {
-  std::vector<double> points(at(count), 0);
-  for (const std::vector<int>& views : tracks)
-    for (const int v : views) ++points[at(v)];
-  return std::max(1.0, median(points));
+Tracks tracks_of_three(Tracks tracks) {
+  std::erase_if(tracks, [](const std::vector<int>& views) { return views.size() < 3; });
+  return tracks;
 }
 
 /// Pairs of a view on each side that were not matched yet; of too many, an even sample.
@@ -153,7 +162,7 @@ Joint weakest_joint(const Reconstruction& model) {
   joint.beyond.assign(at(count), 0);
   const Tracks tracks = views_of_points(model);
   if (count < 2 * fewest_on_a_side || count > most_views || tracks.empty()) return joint;
-  const double points_a_view = median_points_a_view(tracks, count);
+  const Tracks of_three = tracks_of_three(tracks);
   Eigen::VectorXd root_degree;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(
       laplacian(tracks, count, root_degree));
@@ -162,7 +171,8 @@ Joint weakest_joint(const Reconstruction& model) {
     std::vector<int> order(at(count));
     std::iota(order.begin(), order.end(), 0);
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return place[a] < place[b]; });
-    take_weakest(tracks, order, points_a_view, joint);
+    take_weakest(tracks, 2, order, joint);
+    take_weakest(of_three, 3, order, joint);
   }
   return joint;
 }

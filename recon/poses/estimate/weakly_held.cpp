@@ -71,9 +71,10 @@ void doubt_beyond(const Joint& joint, const Reconstruction& model,
   for (std::size_t v = 0; v < joint.beyond.size(); ++v) {
     if (joint.beyond[v] == 0) continue;
     add_doubt({model.views[v].name, DoubtReason::few_common_points,
-               fmt::format("{} points join it and {} more to the other views, too few to say how "
+               fmt::format("{} points{} join it and {} more to the other views, too few to say how "
                            "the two parts lie; take views between them",
-                           joint.points, joint.views_beyond - 1)},
+                           joint.points, joint.views_of_point > 2 ? " that three views see" : "",
+                           joint.views_beyond - 1)},
               doubtful);
   }
 }

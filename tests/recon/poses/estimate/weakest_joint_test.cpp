@@ -78,12 +78,29 @@ TEST(WeakestJoint, DoesNotDependOnTheOrderOfViewsOrPoints) {
   for (const int first : {0, 8})
     for (int v = first; v + 2 < (first == 0 ? 8 : 14); ++v)
       mixed.share({at_place(v), at_place(v + 1), at_place(v + 2)}, 100);
-  mixed.share({at_place(2), at_place(10)}, 30);
+  mixed.share({at_place(2), at_place(3), at_place(10)}, 30);
   std::shuffle(mixed.model.points.begin(), mixed.model.points.end(), rng);
   const Joint joint = weakest_joint(mixed.model);
   EXPECT_EQ(joint.points, 30);
   for (int v = 0; v < 14; ++v)
     EXPECT_EQ(joint.beyond[static_cast<std::size_t>(at_place(v))] != 0, v >= 8) << v;
+}
+
+/// Each pair across holds a direction, and a scale of its own.
+TEST(WeakestJoint, OfPointsOfTwoViewsIsLoose) {
+  Joints two(14);
+  two.walk(0, 8, 100);
+  two.walk(8, 6, 100);
+  for (const int v : {0, 3, 6}) two.share({v, 8 + v / 2}, 40);
+  two.share({4, 9, 11}, 15);
+  const Joint joint = weakest_joint(two.model);
+  EXPECT_EQ(joint.points, 15);
+  EXPECT_EQ(joint.views_of_point, 3);
+  EXPECT_EQ(joint.views_beyond, 6);
+  EXPECT_TRUE(joint.loose());
+
+  two.share({4, 9, 11}, 100);
+  EXPECT_FALSE(weakest_joint(two.model).loose());
 }
 
 TEST(WeakestJoint, PartsThatNothingJoinsAreLoose) {
