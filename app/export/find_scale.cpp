@@ -11,7 +11,6 @@
 
 #include "core/geometry/scene_ball.hpp"
 #include "core/numeric/median.hpp"
-#include "recon/assembly/looked_at.hpp"
 #include "recon/measurement/field_source.hpp"
 #include "recon/measurement/located.hpp"
 
@@ -35,19 +34,18 @@ measurement::SurfaceSource surface_of(const view::FinishedRun& run) {
   return source;
 }
 
+Error of_usage(Error error) {
+  if (error.kind == ErrorKind::input) error.kind = ErrorKind::usage;
+  error.where = "--distance: " + error.where;
+  return error;
+}
+
 /// The command line's place: what is wrong with it is a matter of usage.
-Result<measurement::Located> pointed(const view::FinishedRun& run, const Place& place,
+Result<measurement::Located> pointed(const view::FinishedRun& run,
+                                     const measurement::SurfaceSource& surface, const Place& place,
                                      const Progress& progress) {
-  const measurement::SurfaceSource surface = surface_of(run);
   if (const auto* point = std::get_if<Eigen::Vector3d>(&place)) {
-    if (!point->allFinite())
-      return fail(ErrorKind::usage, "--distance", "a point that is not finite", "write X,Y,Z");
-    if (const double off = (*point - run.center).norm(); !(off <= surroundings_reach * run.radius))
-      return fail(ErrorKind::usage, "--distance",
-                  fmt::format("a point outside of the scene: {:.3g} from its middle, the cameras "
-                              "stand {:.3g} from it",
-                              off, run.radius),
-                  "give coordinates of this run's world, or pixels of recorded views");
+    ORBITFUSE_TRY(measurement::check_in_scene(*point, run.center, run.radius).map_error(of_usage));
     return measurement::located(surface, *point, run.radius, progress);
   }
   const auto& pixel = std::get<PixelPlace>(place);
@@ -57,10 +55,7 @@ Result<measurement::Located> pointed(const view::FinishedRun& run, const Place& 
     return fail(ErrorKind::usage, "--distance", "'" + pixel.view + "', which is no posed view",
                 "name one as the session does, e.g. " +
                     (run.views.empty() ? "visible/000000.jpg" : run.views.front().view.name));
-  auto place_found = measurement::located(surface, found->view, pixel.pixel, progress);
-  if (!place_found && place_found.error().kind == ErrorKind::input)
-    place_found.error().kind = ErrorKind::usage;
-  return place_found;
+  return measurement::located(surface, found->view, pixel.pixel, progress).map_error(of_usage);
 }
 
 double residual(const Similarity3d& metres_from_world, const PosePair& pair) {
@@ -87,8 +82,9 @@ Result<double> metres_of(const std::string& option, const std::string& words) {
 
 Result<MetricScale> scale_of_distance(const view::FinishedRun& run, const Place& from,
                                       const Place& to, double metres, const Progress& progress) {
-  ORBITFUSE_ASSIGN(const measurement::Located a, pointed(run, from, progress));
-  ORBITFUSE_ASSIGN(const measurement::Located b, pointed(run, to, progress));
+  const measurement::SurfaceSource surface = surface_of(run);
+  ORBITFUSE_ASSIGN(const measurement::Located a, pointed(run, surface, from, progress));
+  ORBITFUSE_ASSIGN(const measurement::Located b, pointed(run, surface, to, progress));
   const auto [length, sigma] = measurement::apart(a, b);
   if (!(length > 1e-6 * run.radius))
     return fail(ErrorKind::usage, "--distance", "two places that are one",

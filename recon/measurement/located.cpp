@@ -9,6 +9,7 @@
 
 #include "core/geometry/lens_fold.hpp"
 #include "core/numeric/median.hpp"
+#include "recon/assembly/looked_at.hpp"
 
 namespace orbitfuse::measurement {
 namespace {
@@ -131,6 +132,23 @@ Apart apart(const Located& a, const Located& b) {
   const double beside = std::max(all(a) + all(b) - in_line, 0.0);
   // What lies beside a line that is not much longer makes it longer too.
   return {length, std::hypot(std::sqrt(in_line), std::sqrt(length * length + beside) - length)};
+}
+
+Status check_in_scene(const Eigen::Vector3d& point, const Eigen::Vector3d& center, double radius) {
+  const auto words = [](const Eigen::Vector3d& p) {
+    return fmt::format("{:.4g},{:.4g},{:.4g}", p.x(), p.y(), p.z());
+  };
+  if (!point.allFinite())
+    return fail(ErrorKind::input, "point " + words(point), "not finite", "write X,Y,Z");
+  const double off = (point - center).norm();
+  if (off <= surroundings_reach * radius) return {};
+  return fail(ErrorKind::input, "point " + words(point),
+              fmt::format("outside of the scene: {:.3g} from its middle, the cameras stand {:.3g} "
+                          "from it",
+                          off, radius),
+              fmt::format("give coordinates of this run's world, the scene's middle is {}; or a "
+                          "pixel of a recorded view",
+                          words(center)));
 }
 
 Result<std::string> pixel_words(const PosedView& view, const Eigen::Vector2d& pixel) {

@@ -52,6 +52,10 @@ Result<Located> located(const SurfaceSource& source, const PosedView& view,
 Result<Located> located(const SurfaceSource& source, const Eigen::Vector3d& point, double radius,
                         const Progress& progress);
 
+/// Input error: not finite, or beyond the surroundings of the cameras that stand `radius` round
+/// `center`.
+Status check_in_scene(const Eigen::Vector3d& point, const Eigen::Vector3d& center, double radius);
+
 /// "pixel 212,340 of visible/000003.jpg", or an input error: it lies outside of the picture.
 Result<std::string> pixel_words(const PosedView& view, const Eigen::Vector2d& pixel);
 

@@ -84,6 +84,10 @@ Result<SavedMeasurement> parse(const json& j, const std::string& where,
   if (!j.contains("answer") || !j["answer"].is_object())
     return fail(ErrorKind::input, where, "no answer in it", put_away);
   saved.answer = j["answer"];
+  if (const auto answer = answer_of_json(saved.answer); !answer)
+    return fail(ErrorKind::input,
+                fmt::format("{}: '{}': {}", where, saved.name, answer.error().where),
+                answer.error().found, put_away);
   ORBITFUSE_TRY(read_words(j, where, saved));
   return saved;
 }

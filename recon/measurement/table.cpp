@@ -21,7 +21,7 @@ struct Row {
   std::string name, kind;
   std::optional<Eigen::Vector3d> position = {};
   const TemperatureReading* reading = nullptr;
-  double along = unknown, distance = unknown, distance_m = unknown,
+  double along = unknown, distance = unknown, distance_uncertainty = unknown, distance_m = unknown,
          distance_uncertainty_m = unknown, difference_k = unknown,
          difference_uncertainty_k = unknown, emissivity = unknown;
   std::string note = {};
@@ -33,12 +33,13 @@ std::string line(const Row& row) {
   const FrameLine* best = r.best();
   const auto at = [&](int i) { return row.position ? number((*row.position)[i], 5) : ""; };
   return fmt::format(
-      "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
+      "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}",
       csv_text(row.name), row.kind, celsius(r.temperature_k), number(r.uncertainty_k),
       celsius(r.field_k), celsius(r.mean_k), celsius(r.min_k), celsius(r.max_k),
       number(r.standard_deviation_k), number(r.spread_k),
       row.reading != nullptr ? fmt::format("{}", r.frames.size()) : "", number(r.angle_deg, 1),
-      at(0), at(1), at(2), number(row.along, 5), number(row.distance, 5), number(row.distance_m, 4),
+      at(0), at(1), at(2), number(row.along, 5), number(row.distance, 5),
+      number(row.distance_uncertainty, 5), number(row.distance_m, 4),
       number(row.distance_uncertainty_m, 4), number(row.difference_k),
       number(row.difference_uncertainty_k), best != nullptr ? csv_text(best->frame) : "",
       number(best != nullptr ? best->pixel.x() : unknown, 1),
@@ -69,9 +70,9 @@ std::string notes_of(const Answer& answer) { return joined(answer.notes); }
 
 std::string csv_header() {
   return "name,kind,temperature_c,uncertainty_k,field_c,mean_c,min_c,max_c,standard_deviation_k,"
-         "spread_k,frames,angle_deg,x,y,z,along,distance,distance_m,distance_uncertainty_m,"
-         "difference_k,"
-         "difference_uncertainty_k,best_view,best_u,best_v,emissivity,note";
+         "spread_k,frames,angle_deg,x,y,z,along,distance,distance_uncertainty,distance_m,"
+         "distance_uncertainty_m,difference_k,difference_uncertainty_k,best_view,best_u,best_v,"
+         "emissivity,note";
 }
 
 std::vector<std::string> csv_rows(const std::string& name, const Answer& answer) {
@@ -103,6 +104,7 @@ std::vector<std::string> csv_rows(const std::string& name, const Answer& answer)
       return rows;
     case Kind::distance:
       row.distance = answer.distance;
+      row.distance_uncertainty = answer.distance_uncertainty;
       row.distance_m = answer.distance_m.value_or(unknown);
       row.distance_uncertainty_m = answer.distance_uncertainty_m;
       return {line(row)};

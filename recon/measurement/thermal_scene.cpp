@@ -192,20 +192,9 @@ Result<FieldView> ThermalScene::seen(std::size_t frame, const Progress& progress
 }
 
 Status ThermalScene::check_within(const Eigen::Vector3d& point) const {
-  const auto words = [](const Eigen::Vector3d& p) {
-    return fmt::format("{:.4g},{:.4g},{:.4g}", p.x(), p.y(), p.z());
-  };
-  if (!point.allFinite())
-    return fail(ErrorKind::input, "point " + words(point), "not finite", "write X,Y,Z");
-  if (!middle_) return {};
-  const double distance = (point - middle_->center).norm();
-  if (distance <= surroundings_reach * middle_->radius) return {};
-  return fail(ErrorKind::input, "point " + words(point),
-              fmt::format("outside of the scene: {:.3g} from its middle, the cameras stand {:.3g} "
-                          "from it",
-                          distance, middle_->radius),
-              fmt::format("give coordinates of this run's world; the scene's middle is {}",
-                          words(middle_->center)));
+  // Cameras whose axes meet nowhere have no surroundings.
+  if (!middle_) return check_in_scene(point, point, 1);
+  return check_in_scene(point, middle_->center, middle_->radius);
 }
 
 Result<Located> ThermalScene::locate(const Eigen::Vector3d& point, const Progress& progress) const {

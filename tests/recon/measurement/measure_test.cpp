@@ -668,6 +668,17 @@ TEST(Measure, SeveralThreadsGetTheSameAnswers) {
   EXPECT_NE(answers[0], answers[1]);
 }
 
+TEST(Measure, ALineOfOnePlaceIsNone) {
+  const ThermalScene scene = box_orbit();
+  Request line;
+  line.kind = Kind::line;
+  line.places = {Eigen::Vector3d(0.4, 0.1, 0), Eigen::Vector3d(0.4, 0.1, 0)};
+  const auto answer = measure(scene, line, {});
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().kind, ErrorKind::input);
+  EXPECT_THAT(answer.error().message(), HasSubstr("one place"));
+}
+
 TEST(Measure, TablesHaveACellForEveryColumn) {
   const ThermalScene scene = box_orbit();
   Request line;
@@ -676,7 +687,10 @@ TEST(Measure, TablesHaveACellForEveryColumn) {
   line.places = {Eigen::Vector3d(0.4, -0.1, 0), Eigen::Vector3d(0.4, 0.1, 0)};
   const std::string header = csv_header();
   const auto columns = std::count(header.begin(), header.end(), ',');
-  for (const Request& request : {spot_at({0.4, 0, 0}), spot_at({0, 0, 0}), line}) {
+  Request distance = line;
+  distance.kind = Kind::distance;
+  EXPECT_THAT(header, HasSubstr(",distance,distance_uncertainty,distance_m,"));
+  for (const Request& request : {spot_at({0.4, 0, 0}), spot_at({0, 0, 0}), line, distance}) {
     const Answer answer = ask(scene, request);
     const auto rows = csv_rows("plain", answer);
     ASSERT_FALSE(rows.empty());

@@ -172,6 +172,9 @@ TEST_F(MeasurementFile, DamageIsNamedAndNothingIsLost) {
   j["measurements"][0]["request"]["kind"] = "sport";
   expect_refused(j.dump(), "sport");
   j = json::parse(whole);
+  j["measurements"][0]["answer"]["reading"]["temperature_k"] = "warm";
+  expect_refused(j.dump(), "'one': answer.reading.temperature_k");
+  j = json::parse(whole);
   j.erase("run");
   expect_refused(j.dump(), "no run");
 }
