@@ -80,13 +80,27 @@ struct Cameras {
 
 Result<Cameras> cameras_of(const view::FinishedRun& run, const DatasetOptions& options) {
   Cameras cameras;
-  for (const view::RecordedView& v : run.views)
-    if (v.modality == Modality::visible) cameras.views.push_back(v.view);
+  std::size_t recorded = 0, doubtful = 0;
+  for (const view::RecordedView& v : run.views) {
+    if (v.modality != Modality::visible) continue;
+    ++recorded;
+    // Its pair would be rendered from where the photo was not taken.
+    if (v.doubt)
+      ++doubtful;
+    else
+      cameras.views.push_back(v.view);
+  }
+  if (cameras.views.empty())
+    return fail(ErrorKind::input, "dataset",
+                fmt::format("the poses of all {} photos are in doubt", recorded),
+                "see why in the report; take views between them");
   if (options.poses == DatasetPoses::recorded) {
     if (!run.session)
       return fail(ErrorKind::input, "dataset", "the session is not where the run read it",
                   "bring it back, or take new poses: --poses new");
     cameras.described = fmt::format("{} recorded views", cameras.views.size());
+    if (doubtful > 0)
+      cameras.described += fmt::format(", {} left out whose poses are in doubt", doubtful);
     return cameras;
   }
   ORBITFUSE_ASSIGN(NewViews fresh, new_views(cameras.views, options.path));

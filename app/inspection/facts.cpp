@@ -260,7 +260,9 @@ void add_finding_limits(const std::vector<InspectionFinding>& findings,
                                 [](const auto& line) { return line.doubtful; }))
       limits.push_back(which + "only views with doubtful poses saw it.");
     if (f.comparison && !f.comparison->known())
-      limits.push_back(which + "it can't be compared: no thermal frame saw one of the two.");
+      limits.push_back(which + "it can't be compared: " +
+                       (f.comparison->reference_gone ? "its reference is no longer saved."
+                                                     : "no thermal frame saw one of the two."));
   }
 }
 

@@ -159,6 +159,7 @@ Result<std::vector<InspectionFinding>> findings_of(const Measurements& saved,
     if (!reference.empty() && !said_here && saved.find(reference) == nullptr) {
       // Removed since: the user who saved it can't mend that here, and the rest is right.
       finding.comparison = Comparison{reference + " (no longer saved)", unknown, unknown, {}, {}};
+      finding.comparison->reference_gone = true;
     } else if (!reference.empty()) {
       ORBITFUSE_ASSIGN(
           finding.comparison,

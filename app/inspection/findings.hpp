@@ -14,13 +14,14 @@ namespace orbitfuse::inspection {
 /// A difference between like components, and how urgent it is.
 struct Comparison {
   std::string with;          ///< name of the reference; empty: of a difference's own two
-  double difference_k = 0;   ///< NaN: no frame sees one of them
+  double difference_k = 0;   ///< NaN: no frame sees one of them, or reference_gone
   double uncertainty_k = 0;  ///< covers the error in 90 of 100 cases
   std::optional<PriorityClass> priority;  ///< none: below all classes, or not known
   /// What it may be as well within the uncertainty, in words; empty: the class is sure.
   std::string or_else;
   /// That the two stand for different object parameters, in words; none: they don't.
   std::optional<std::string> caution = {};
+  bool reference_gone = false;  ///< it is no longer saved
   bool known() const;
 };
 

@@ -152,7 +152,9 @@ std::string pictures(const FindingPictures& p, bool measured) {
   const std::string from = escape(p.view);
   std::string html = "<div class=\"three\">\n" + picture(p.visible, "Visible, rendered from there");
   if (p.thermal_view)
-    html += picture(p.thermal, "Thermal, the frame as recorded") +
+    html += picture(p.thermal, p.thermal_is_hatched
+                                   ? "Thermal, the frame as recorded; hatched: not measured"
+                                   : "Thermal, the frame as recorded") +
             picture(p.fused, "Fused, rendered from there");
   else if (measured)
     html += "<p class=\"notice\">No thermal frame sees this place: it has no thermal picture.</p>";

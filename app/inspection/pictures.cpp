@@ -13,6 +13,7 @@
 #include "core/geometry/narrowed.hpp"
 #include "core/image/image_io.hpp"
 #include "core/image/undistorted.hpp"
+#include "fusion/heat/heat.hpp"
 #include "recon/measurement/measure.hpp"
 
 namespace orbitfuse::inspection {
@@ -82,16 +83,20 @@ Result<const RecordedView*> visible_view_of(const std::vector<Eigen::Vector3d>& 
   return best;
 }
 
-Result<cv::Mat> recorded_thermal(const RecordedView& view, const Camera& camera,
-                                 const FinishedRun& run, const ThermalScene& scene) {
+Status add_recorded_thermal(const RecordedView& view, const Camera& camera, const FinishedRun& run,
+                            const ThermalScene& scene, FindingPictures& pictures) {
   const auto& frames = scene.frames();
   const auto frame = std::find_if(frames.begin(), frames.end(),
                                   [&](const auto& f) { return f.view.name == view.view.name; });
-  if (frame == frames.end()) return cv::Mat();
-  ORBITFUSE_ASSIGN(const cv::Mat kelvin,
+  if (frame == frames.end()) return {};
+  ORBITFUSE_ASSIGN(const cv::Mat recorded_k,
                    scene.image(static_cast<std::size_t>(frame - frames.begin())));
+  const cv::Mat kelvin = undistorted(recorded_k, view.view.camera, camera);
   ORBITFUSE_ASSIGN(const cv::Mat colors, palette(run.config.render.palette));
-  return colorize(undistorted(kelvin, view.view.camera, camera), run.span, colors);
+  pictures.thermal = colorize(kelvin, run.span, colors);
+  fusion::hatch_unmeasured(pictures.thermal, kelvin);
+  pictures.thermal_is_hatched = cv::countNonZero(kelvin != kelvin) > 0;
+  return {};
 }
 
 /// Draws on all pictures of a finding alike: white with a dark rim, to be seen on any colour.
@@ -233,7 +238,7 @@ Result<FindingPictures> pictures_of(const InspectionFinding& finding, const Fini
   pictures.visible = layers.visible.clone();
   if (pictures.thermal_view) {
     pictures.fused = layers.fused.clone();
-    ORBITFUSE_ASSIGN(pictures.thermal, recorded_thermal(*view, camera, run, scene));
+    ORBITFUSE_TRY(add_recorded_thermal(*view, camera, run, scene, pictures));
   }
   Marker marker(camera, pose);
   pictures.marks = mark(answer, finding.request, scene, progress, marker);

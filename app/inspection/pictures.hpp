@@ -17,9 +17,10 @@ struct FindingPictures {
   bool thermal_view = false;  ///< one that measured; else a visible one, where none did
   bool doubtful = false;      ///< its pose
   cv::Mat visible;            ///< CV_8UC3, rendered
-  cv::Mat thermal;    ///< CV_8UC3, the frame as it was recorded, in the run's palette and span
-  cv::Mat fused;      ///< CV_8UC3, rendered
-  std::string marks;  ///< what is drawn, in words
+  cv::Mat thermal;  ///< CV_8UC3, the frame as it was recorded, in the run's palette and span
+  bool thermal_is_hatched = false;  ///< somewhere, where its frame has no temperature
+  cv::Mat fused;                    ///< CV_8UC3, rendered
+  std::string marks;                ///< what is drawn, in words
 };
 
 /// From the thermal frame that sees it best (TemperatureReading::best), or else the visible view

@@ -170,6 +170,19 @@ StageContext Runner::context(fs::path folder, bool resume) const {
   return context;
 }
 
+/// Damaged, or made of what has been made anew since.
+std::optional<std::string> Runner::unfit_as_it_lies(const std::string& stage,
+                                                    const StageRecord& record) const {
+  if (auto wrong = damage(options_.out / stage, record)) return wrong;
+  for (const auto& [name, hash] : record.inputs) {
+    const auto input = outputs_.find(name);
+    if (unfit_.contains(name) || (input != outputs_.end() && input->second != hash))
+      return fmt::format("it was made of an earlier {}: bring the run up to date, orbitfuse run",
+                         name);
+  }
+  return std::nullopt;
+}
+
 StageStatus Runner::visit(const Stage& stage) {
   StageStatus status;
   status.stage = stage.name;
@@ -209,8 +222,9 @@ StageStatus Runner::visit(const Stage& stage) {
   const bool as_it_lies = !writes(stage.name);
   if (as_it_lies) {
     const std::optional<std::string> wrong =
-        record ? damage(options_.out / stage.name, *record) : "it has not run yet";
+        record ? unfit_as_it_lies(stage.name, *record) : "it has not run yet";
     if (wrong) {
+      if (record) unfit_.insert(stage.name);
       status.state = StageState::absent;
       status.why = *wrong;
       return status;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -62,6 +63,8 @@ class Runner {
   StageContext context(std::filesystem::path folder, bool resume) const;
   std::optional<EarlierResult> earlier_result(const Stage& stage, const Key& key) const;
   Status remove_all() const;
+  std::optional<std::string> unfit_as_it_lies(const std::string& stage,
+                                              const StageRecord& record) const;
   StageStatus visit(const Stage& stage);
   StageStatus execute(const Stage& stage, const Key& key, std::string why);
   /// None: what it made still holds.
@@ -74,6 +77,7 @@ class Runner {
   std::vector<std::string> closure_;
   std::vector<StageStatus> statuses_;
   std::map<std::string, std::string> outputs_;  ///< done stage -> outputs hash
+  std::set<std::string> unfit_;                 ///< stages that are left as they lie, and aside
 };
 
 /// The targets (empty: all) and all they read, in order.

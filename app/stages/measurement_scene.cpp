@@ -108,6 +108,10 @@ Status add_named_views(const pipeline::StageContext& context, SceneParts& parts)
   }
   if (!context.has("render")) return {};
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
+  if (!pipeline::out_of_date(context.out, {"render"}).empty()) {
+    for (const ViewFiles& view : rendered.views) parts.outdated.push_back(view.name);
+    return {};
+  }
   ORBITFUSE_ASSIGN(const Transforms transforms,
                    read_transforms_json(context.of("render") / "transforms.json"));
   for (std::size_t i = 0; i < std::min(rendered.views.size(), transforms.frames.size()); ++i)

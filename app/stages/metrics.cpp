@@ -101,8 +101,10 @@ Status score_field(const StageContext& context, const StageInputs& in, Modality 
         scores.field_alone_k.add(truth, field_alone + shading);
       }
       const TemperatureSpan span = common_span({truth}, 0, 100);
-      truth = gray_of_kelvin(truth, span);
-      rendered = gray_of_kelvin(rendered, span);
+      // What one of them doesn't know says nothing of the other: alike there.
+      const cv::Mat blind = (truth != truth) | (rendered != rendered);
+      truth = gray_of_kelvin(truth, span).setTo(0, blind);
+      rendered = gray_of_kelvin(rendered, span).setTo(0, blind);
     }
     ORBITFUSE_ASSIGN(const auto values, render_metrics(truth, rendered));
     scores.means.add(std::string(name(modality)), view.name, values);
@@ -212,7 +214,7 @@ Result<StageOutput> score(const StageContext& context, const StageInputs& in) {
 pipeline::Stage metrics_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "metrics";
-  stage.version = 8;  // how much held-out frames explain
+  stage.version = 9;  // dead pixels say nothing
   stage.options = in.config->settings().to_json("metrics");
   stage.uses = {"poses_visible", "poses_thermal", "train_visible",
                 "train_thermal", "render",        "fuse"};

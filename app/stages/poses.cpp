@@ -143,7 +143,7 @@ pipeline::Stage poses_stage(const StageInputs& in, Modality modality) {
   stage.name = "poses_" + std::string(name(modality));
   stage.version = 26;  // joints of points that three views see
   if (!visible) {
-    stage.version = 30;  // without photos in doubt
+    stage.version = 31;  // rigs of the usual camera; order before COLMAP alone
     stage.uses = {"poses_visible"};
     if (asks_for_renders(in.session->session, in.config->poses))
       stage.uses.push_back("train_visible");

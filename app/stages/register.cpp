@@ -28,9 +28,10 @@ Result<ThermalEvidence> thermal_evidence(const StageContext& context, const Sess
   ThermalEvidence thermal;
   ORBITFUSE_ASSIGN(thermal.cloud, cloud_of(context, "train_thermal"));
   ORBITFUSE_ASSIGN(Reconstruction posed, load_trained_poses(context, Modality::thermal));
-  for (const PosedView& view : posed.views) {
+  for (PosedView& view : posed.views) {
     ORBITFUSE_ASSIGN(cv::Mat image, field_image(input.session.folder / view.name,
                                                 input.samples(Modality::thermal)));
+    ORBITFUSE_TRY(straighten(image, view));
     thermal.images.push_back(std::move(image));
   }
   thermal.views = std::move(posed.views);
@@ -39,12 +40,28 @@ Result<ThermalEvidence> thermal_evidence(const StageContext& context, const Sess
 
 json image_figures(const SimilarityRefinement& r) {
   return {{"kept", r.improved},
+          {"unseen", r.unseen},
           {"starts", r.starts},
           {"agreement_before", r.agreement_before},
           {"agreement_after", r.agreement_after},
           {"patches_before", r.matches_before},
           {"patches_after", r.matches_after},
           {"visible_from_thermal", similarity_json(r.visible_from_thermal)}};
+}
+
+const char* image_outcome(const SimilarityRefinement& r) {
+  if (r.improved) return "kept";
+  return r.unseen ? "not possible, they show too little; the clouds' answer stays"
+                  : "refused, the clouds' answer stays";
+}
+
+std::string unseen_words(const SimilarityRefinement& r) {
+  return fmt::format(
+      "the thermal images show nothing that tells whether the registration is right ({} patches of "
+      "the visible scene in place, agreement of edges {:.3f}): look at the fused views, and where "
+      "edges lie apart there, record thermal views that show more of the object's edges",
+      r.improved ? r.matches_after : r.matches_before,
+      r.improved ? r.agreement_after : r.agreement_before);
 }
 
 StageOutput describe(const FieldRegistration& found) {
@@ -55,6 +72,7 @@ StageOutput describe(const FieldRegistration& found) {
   output.skips.insert(output.skips.end(), images.skips.begin(), images.skips.end());
   if (clouds.ambiguous)
     output.warnings.push_back("the registration is ambiguous: " + clouds.ambiguity);
+  if (images.unseen) output.warnings.push_back(unseen_words(images));
   output.metrics = to_json(clouds);
   output.metrics["brief"] =
       clouds.brief() + (images.improved ? ", refined by the thermal images" : "");
@@ -67,8 +85,8 @@ StageOutput describe(const FieldRegistration& found) {
   output.metrics["facts"].push_back(json::array(
       {"refined by the thermal images",
        fmt::format("{}: agreement of edges {:.3f} before, {:.3f} after, the best of {} starts",
-                   images.improved ? "kept" : "refused, the clouds' answer stays",
-                   images.agreement_before, images.agreement_after, images.starts)}));
+                   image_outcome(images), images.agreement_before, images.agreement_after,
+                   images.starts)}));
   return output;
 }
 
@@ -112,7 +130,7 @@ Result<StageOutput> run_register(const StageContext& context, const SessionInput
 pipeline::Stage register_stage(const StageInputs& in) {
   pipeline::Stage stage;
   stage.name = "register";
-  stage.version = 3;  // restarts from the project's own random numbers
+  stage.version = 4;  // sees straight thermal images, and counts shifts
   stage.needs = {"poses_visible", "poses_thermal", "train_visible", "train_thermal"};
   stage.options = {{"seed", in.config->seed}};
   stage.run = [in](const StageContext& context) {

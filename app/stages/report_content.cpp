@@ -56,8 +56,10 @@ Status add_fused(const StageContext& context, const std::vector<std::string>& me
   return {};
 }
 
-Status add_views(const StageContext& context, const RunConfig& config, report::Model& model) {
-  if (!context.has("render")) return {};
+/// How many were rendered: the page may show fewer.
+Result<std::size_t> add_views(const StageContext& context, const RunConfig& config,
+                              report::Model& model) {
+  if (!context.has("render")) return 0;
   ORBITFUSE_ASSIGN(const RenderedViews rendered, load_rendered_views(context.of("render")));
   std::vector<std::string> methods;
   if (context.has("fuse")) {
@@ -82,7 +84,7 @@ Status add_views(const StageContext& context, const RunConfig& config, report::M
   if (!model.views.empty() && !model.views[0].thermal.empty()) {
     ORBITFUSE_ASSIGN(model.palette_bgr, palette(config.render.palette));
   }
-  return {};
+  return rendered.views.size();
 }
 
 std::string advice(const report::PosesSummary& poses) {
@@ -258,7 +260,7 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   model.subtitle =
       fmt::format("Session {}, recorded {}. Computed on {}, {} threads.", input.session.id,
                   input.session.created, cpu_description(), thread_count());
-  ORBITFUSE_TRY(add_views(context, *in.config, model));
+  ORBITFUSE_ASSIGN(const std::size_t rendered_views, add_views(context, *in.config, model));
   add_poses(context, input, model);
   add_registration(context, model);
   add_fields(context, model);
@@ -270,7 +272,7 @@ Result<report::Model> report_content(const StageContext& context, const StageInp
   model.stages = *context.earlier;
   double wall_s = 0;
   for (const StageStatus& s : model.stages) wall_s += s.wall_s;
-  model.headline.emplace_back("new views", fmt::format("{}", model.views.size()));
+  model.headline.emplace_back("new views", fmt::format("{}", rendered_views));
   if (model.has_temperature)
     model.headline.emplace_back(
         "temperatures shown",

@@ -17,6 +17,7 @@
 #include "core/image/image_io.hpp"
 #include "core/option_range.hpp"
 #include "core/system/folder_change_lock.hpp"
+#include "fusion/heat/heat.hpp"
 
 namespace orbitfuse::view {
 namespace fs = std::filesystem;
@@ -180,7 +181,9 @@ Result<cv::Mat> FilmMaker::picture(const FilmOrder& order, const Bookmark& from)
   if (order.layer == FilmLayer::visible) return seen.visible;
   if (order.layer == FilmLayer::fused) return seen.fused;
   ORBITFUSE_ASSIGN(const cv::Mat colors, palette(order.palette));
-  return colorize(seen.kelvin, order.span, colors);
+  cv::Mat painted = colorize(seen.kelvin, order.span, colors);
+  fusion::hatch_unmeasured(painted, seen.kelvin);
+  return painted;
 }
 
 Result<fs::path> FilmMaker::make(const FilmOrder& order, const std::vector<Bookmark>& way) {

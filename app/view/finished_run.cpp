@@ -180,6 +180,10 @@ Status load_scales(const pipeline::StageContext& context, FinishedRun& run) {
 
 }  // namespace
 
+Result<std::string> identity_of_run(const fs::path& out) {
+  return identity_of(stages::context_of_run(out));
+}
+
 Result<FinishedRun> load_finished_run(const fs::path& out, const stages::RunConfig& config,
                                       const Progress& progress) {
   std::error_code unreadable;

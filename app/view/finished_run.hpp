@@ -59,6 +59,9 @@ struct FinishedRun {
   Samples samples() const { return thermal_is_gray ? Samples::gray : Samples::kelvin; }
 };
 
+/// FinishedRun::identity of what lies in the folder now. Errors: input (a damaged record).
+Result<std::string> identity_of_run(const std::filesystem::path& out);
+
 /// Errors: input (no run, none of its fields, damaged files), cancelled.
 Result<FinishedRun> load_finished_run(const std::filesystem::path& out,
                                       const stages::RunConfig& config, const Progress& progress);

@@ -15,7 +15,8 @@ namespace orbitfuse::view {
 
 /// Measurements of the run that the viewer shows, by recon/measurement and in the same
 /// measurements.json as the command line's. Their world is the viewer's frame. Unavailable error
-/// where several are being measured already: each holds a thread of the server.
+/// where several are being measured already: each holds a thread of the server. Input error, of
+/// all, where the run was made again since the viewer was opened.
 class Measuring {
  public:
   /// The run must outlive it.
@@ -36,6 +37,7 @@ class Measuring {
   Result<nlohmann::json> list();
 
  private:
+  Status check_same_run() const;
   Result<const measurement::ThermalScene*> scene();
   template <class Work>
   auto in_turn(Work work) -> decltype(work());

@@ -55,8 +55,7 @@ struct ViewServer::Impl {
   FilmMaker films{run, layers, turns};
   Measuring measuring{run};
   MeshMaking mesh;
-  std::string page = page_html(), scene = shown_json(scene_json(run)),
-              surface = packed(run.surface, surface_kelvin_per_count(run));
+  std::string page = page_html(), surface = packed(run.surface, surface_kelvin_per_count(run));
   WebServer server;
 
   Result<std::string> picture(const WebRequest& request) {
@@ -159,10 +158,8 @@ struct ViewServer::Impl {
          [this](const WebRequest&) -> WebAnswer {
            return {200, "text/html; charset=utf-8", page};
          }},
-        {"/scene",
-         [this](const WebRequest&) -> WebAnswer {
-           return {200, "application/json", scene};
-         }},
+        // Made anew for each page: the run's scale may have been told since.
+        {"/scene", [this](const WebRequest&) { return json_answer(scene_json(run)); }},
         {"/surface", [this](const WebRequest&) { return bytes_answer(surface); }},
         {"/mesh",
          [this](const WebRequest&) {

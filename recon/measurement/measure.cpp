@@ -210,6 +210,8 @@ Result<CommonView> common_view(const ThermalScene& scene, const Request& request
 Result<Answer> measure_polygon(const ThermalScene& scene, const Request& request,
                                const Reradiometry& radiometry, const Progress& progress) {
   ORBITFUSE_ASSIGN(const CommonView common, common_view(scene, request, progress));
+  for (const Eigen::Vector2d& corner : common.pixels)
+    ORBITFUSE_TRY(pixel_words(*common.view, corner));
   // Of points the outline may cross itself in a view that its corners were not chosen in.
   if (std::holds_alternative<PixelPlace>(request.places[0]) && crosses_itself(common.pixels))
     return fail(ErrorKind::input, "polygon in " + common.view->name, "its sides cross each other",

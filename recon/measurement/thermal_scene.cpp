@@ -156,6 +156,10 @@ Result<const PosedView*> ThermalScene::view(const std::string& name) const {
                 "pixels to the scene",
                 "choose a posed view that shows the place, e.g. " + alike(name, known) +
                     ", or give the place as --point; the run's report says why it has no pose");
+  if (std::find(parts_.outdated.begin(), parts_.outdated.end(), name) != parts_.outdated.end())
+    return fail(ErrorKind::input, "view " + name, "rendered before poses or fields were made anew",
+                "bring the run up to date: orbitfuse run; or choose a posed view, e.g. " +
+                    alike(name, known));
   return fail(ErrorKind::input, "view " + name, "no view of this run has that name",
               "name a rendered or a posed view, e.g. " + alike(name, known));
 }

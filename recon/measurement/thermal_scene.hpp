@@ -45,6 +45,7 @@ struct SceneParts {
   std::set<std::string> doubtful_views = {};  ///< of these, such whose pose may be wrong
   /// Frames of the session that have no pose, so that nothing can be measured in them.
   std::vector<std::string> unposed = {};
+  std::vector<std::string> outdated = {};  ///< views that were rendered of an earlier world
   std::vector<PosedView>
       orbit;  ///< cameras that say where the object is (recon/assembly/looked_at)
   /// Where distances begin and end; without a renderer: the thermal field and its sure frames.

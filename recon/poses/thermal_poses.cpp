@@ -115,16 +115,34 @@ Result<ThermalPoses> from_images(const Session& session, const VisibleScene* vis
           used + " was used");
     return poses;
   };
+  std::optional<ThermalPoses> spaced;
   if (const auto spacing_deg = spacing_by_photos(session, *visible)) {
     auto poses = estimated(at_spacing(session, Modality::thermal, *spacing_deg), visible, options,
                            workdir / "spacing", progress, steps);
-    if (poses || poses.error().kind != ErrorKind::quality)
-      return said(std::move(poses),
-                  fmt::format("the photos' own spacing, {:.4g} degrees,", *spacing_deg));
+    if (!poses && poses.error().kind != ErrorKind::quality) return poses;
+    if (poses) {
+      spaced = *said(std::move(poses),
+                     fmt::format("the photos' own spacing, {:.4g} degrees,", *spacing_deg));
+      if (spaced->shares_visible_frame) return *std::move(spaced);
+    }
   }
-  return said(estimated(in_order_alone(session, Modality::thermal), visible, options, workdir,
-                        progress, steps),
-              "the order alone");
+  auto ordered = said(estimated(in_order_alone(session, Modality::thermal), visible, options,
+                                workdir, progress, steps),
+                      "the order alone");
+  const bool given_up = !ordered && ordered.error().kind != ErrorKind::quality;
+  // A world of their own is worth less than a place among the photos.
+  if (given_up || !spaced || (ordered && ordered->shares_visible_frame)) return ordered;
+  return *std::move(spaced);
+}
+
+/// Known thermal poses of a world that no photos' are of.
+void tell_unchecked(bool photos_are_posed, ModalityPoses& known) {
+  if (photos_are_posed)
+    known.warnings.push_back(
+        "nothing checks the known thermal poses: the photos' poses are not of their world; give "
+        "the photos' as well, or let both be estimated: --set poses.use_known_poses=false");
+  known.skips.push_back({"check of the known thermal poses",
+                         "no photos have known poses in the same world", "taken as they are"});
 }
 
 /// Known poses that nothing confirms and nothing can replace.
@@ -149,6 +167,7 @@ Result<ThermalPoses> estimate_thermal_poses(const Session& session, const Visibl
   ORBITFUSE_ASSIGN(ModalityPoses known, known_poses(session, Modality::thermal));
   // Known poses of a session share one world; estimated visible ones do not live in it.
   const bool shares = visible != nullptr && has_known_poses(session, Modality::visible);
+  if (!shares && options.check_known_poses) tell_unchecked(visible != nullptr, known);
   if (!shares || !options.check_known_poses) return ThermalPoses{std::move(known), shares};
   ORBITFUSE_ASSIGN(const std::optional<Contradiction> contradiction,
                    check_by_scene(session, *visible, progress, known));

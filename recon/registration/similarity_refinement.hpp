@@ -17,12 +17,20 @@ struct SimilarityRefinement {
   int matches_before = 0, matches_after = 0;         ///< patches within 2 px
   /// The images are explained better than before; if not, the similarity is the one given.
   bool improved = false;
+  /// Images were given but don't see the final answer: its edges don't agree with theirs at all, or
+  /// too few patches are in place to tell a right one by. False where none were given.
+  bool unseen = false;
   int starts = 1;           ///< tried from
   std::vector<Skip> skips;  ///< starts not tried, and why
 };
 
-/// `images`: CV_32FC1 of `thermal` views, in their own world. Errors: input (counts differ), the
-/// renderer's, cancelled.
+/// A thermal view and its recorded image as its camera without distortion would have taken them:
+/// the renders that it is compared with are straight. Both stay where there is none. Error: input
+/// (the image isn't of its camera's size).
+Status straighten(cv::Mat& image, PosedView& view);
+
+/// `images`: CV_32FC1 of `thermal` views, straight (see straighten()), in their own world. Errors:
+/// input (counts differ), the renderer's, cancelled.
 Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
                                                const std::vector<cv::Mat>& images,
                                                const std::vector<PosedView>& thermal,

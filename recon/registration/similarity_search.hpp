@@ -19,8 +19,9 @@ struct SimilaritySearchOptions {
   /// False: the clouds call their own answer ambiguous, which no single start is trusted on.
   bool clouds_decide = false;
   /// Share of patches in place from which the clouds' answer counts as confirmed by the images, if
-  /// these also leave it within half a step. Necessary, not sufficient: right answers have 0.85 and
-  /// more, but a wrong one had 0.81 (docs/benchmarks/poses.md).
+  /// these also leave it within half a step; a shift by `growth` of the scene's diameter is one.
+  /// Necessary, not sufficient: right answers have 0.85 and more, but a wrong one had 0.81
+  /// (docs/notes/poses.md).
   double decisive_share = 0.8;
   /// Of all views, spread evenly: enough to tell starts apart. The last rounds take all.
   int most_views = 8;

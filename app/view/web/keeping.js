@@ -56,8 +56,12 @@ function keepingPanel(scene, surface, rest) {
     else if (state.file) say("film-words", "made: " + state.file);
     if (state.making) setTimeout(() => ask("/film").then(a => a.json()).then(showFilm).catch(saying("film-words")), 500);
   };
+  /// The server renders films, and the overlay is laid over in the browser.
+  const filmLayer = () => rest.layer === "mix" ? "fused" : rest.layer;
+  const sayFilmLayer = () => { $("film-layer").hidden = filmLayer() === rest.layer; };
+  viewer.onPicture.push(sayFilmLayer);
   $("film").onclick = () => {
-    const layer = { mix: "fused" }[rest.layer] || rest.layer, [width, height] = rest.size(1);
+    const layer = filmLayer(), [width, height] = rest.size(1);
     ask("/film", { kind: $("film-kind").value, layer, palette: show.palette, span: [show.low, show.high], width, height })
       .then(a => a.json()).then(showFilm).catch(saying("film-words"));
   };

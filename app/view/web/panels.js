@@ -23,6 +23,17 @@ function download(blob, name) {
 function element(tag, words, className) { const e = document.createElement(tag); if (words !== undefined) e.textContent = words; if (className) e.className = className; return e; }
 function button(words, onclick) { const b = element("button", words); b.type = "button"; b.onclick = onclick; return b; }
 
+/// Boxes for temperatures that are read in the unit that is shown, whenever something is measured.
+const typedTemperatures = ["reflected", "air", "recorded-reflected"];
+function chooseUnit(chosen) {
+  const typed = typedTemperatures.map(id => [$(id), $(id).value.trim()]).filter(([, text]) => text && Number.isFinite(Number(text)))
+    .map(([box, text]) => [box, toKelvin(Number(text))]);
+  unit = chosen;
+  // Three decimals, so that a unit and back gives what was typed.
+  for (const [box, kelvin] of typed) box.value = +fromKelvin(kelvin).toFixed(3);
+  localStorage.setItem("unit", unit);
+}
+
 /// Palette, span, unit and isotherm; onChange when colours are to be drawn anew.
 function temperaturePanel(scene, onChange) {
   options($("palette"), Object.keys(palettes).map(p => [p, p]), show.palette);
@@ -35,11 +46,12 @@ function temperaturePanel(scene, onChange) {
     const followed = [viewer.rest.layer, viewer.rest.other].some(layer => layer === "thermal" || layer === "mix");
     $("palette").disabled = $("auto-span").disabled = $("run-span").disabled = !followed;
     $("low").disabled = $("high").disabled = show.auto || !followed;
+    for (const words of document.querySelectorAll(".unit")) words.textContent = unitWords().trim();
     drawLegend();
   };
   const changed = () => { fill(); onChange(); };
   $("palette").onchange = () => { show.palette = $("palette").value; changed(); };
-  $("unit").onchange = () => { unit = $("unit").value; localStorage.setItem("unit", unit); changed(); };
+  $("unit").onchange = () => { chooseUnit($("unit").value); changed(); };
   $("unit").disabled = gray;
   $("auto-span").onchange = () => { show.auto = $("auto-span").checked; changed(); };
   $("run-span").onclick = () => { show.auto = $("auto-span").checked = false; [show.low, show.high] = scene.span; changed(); };

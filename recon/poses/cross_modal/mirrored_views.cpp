@@ -12,8 +12,6 @@ namespace {
 constexpr double distance_reach = 1.13;
 /// Views that are not mirrored lead by more at the first look.
 constexpr double decided_at_first = 1.5;
-/// Of fewer the true start may be missed, and the spread of their supports is itself chance.
-constexpr std::size_t least_for_mirrored = 16;
 
 Camera mirrored(Camera camera) {
   camera.cx = camera.width - camera.cx;

@@ -187,22 +187,32 @@ Status judge_bundled(const OrbitRefinement& refinement, const std::vector<std::s
 
 /// What temperatures said of the views through a lens that has turned out to be another, or could
 /// not say because they contradicted most, they are asked again; what they move is bundled again.
-/// The images are straight by now. Returns how many they contradict.
+/// The images are straight by now. What form said of places that the bundle moved views to stands
+/// where they still are. Returns how many the temperatures contradict.
 Result<int> judge_anew(const OrbitRefinement& refinement, const FocalGuess& prior, Fit& alignment) {
   const TraceSpan span("judge anew");
   refinement.progress.report({"poses.thermal", 3, 4, -1, "views judged anew, by the lens found"});
+  const Fit judged = alignment;
   for (RenderAlignedView& view : alignment.views) view.verdict = {};
   const double found_focal_px = alignment.views.front().view.camera.fx;
   const double radial = std::exchange(alignment.radial, 0),
                radial_px = std::exchange(alignment.radial_px, 0);
   ORBITFUSE_ASSIGN(const TemperatureCheck check, correct_by_temperatures(refinement, alignment));
-  if (check.moved > 0) {
+  // The bundle has left those out that were dropped before it.
+  const bool came_back = not_dropped(alignment).size() > not_dropped(judged).size();
+  if (check.moved > 0 || came_back) {
     const Fit before = alignment;
     ORBITFUSE_TRY(
         bundle_thermal(refinement, {prior.focal_px, prior.relative_sigma, 0}, {}, alignment));
     ORBITFUSE_TRY(judge_bundled(refinement, not_dropped(alignment), before, alignment));
     ORBITFUSE_TRY(keep_by_temperatures(refinement, check, alignment));
   }
+  for (std::size_t i = 0; i < alignment.views.size(); ++i)
+    if (judged.views[i].verdict.reason == DoubtReason::neighbours_elsewhere &&
+        alignment.views[i].verdict.sure() &&
+        same_place(refinement.orbit, judged.views[i].view.cam_from_world,
+                   alignment.views[i].view.cam_from_world))
+      alignment.views[i].verdict = judged.views[i].verdict;
   const double scale = alignment.views.front().view.camera.fx / found_focal_px;
   alignment.radial = radial * scale * scale;
   alignment.radial_px = radial_px;

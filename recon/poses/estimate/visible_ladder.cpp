@@ -260,17 +260,20 @@ class VisibleLadder {
     return {};
   }
 
+  static Joint sure_joint(const Reconstruction& model) {
+    return weakest_sure_joint(model, weakly_held(model));
+  }
   static bool hangs_together(const Reconstruction& now, const Reconstruction& before) {
     return now.views.size() >= before.views.size() &&
-           weakest_joint(now).share > weakest_joint(before).share;
+           sure_joint(now).share > sure_joint(before).share;
   }
 
   /// Two parts of the best model that few points join: by more pairs, then by more features.
   Status try_firmer_joint() {
-    const Joint joint = weakest_joint(selection_.best());
+    const Joint joint = sure_joint(selection_.best());
     if (!joint.loose()) return {};
     ORBITFUSE_TRY(spared(try_joining(joint)));
-    if (asked_affine_ || !weakest_joint(selection_.best()).loose()) return {};
+    if (asked_affine_ || !sure_joint(selection_.best()).loose()) return {};
     ORBITFUSE_TRY(try_affine_features(hangs_together));
     return affine_ && &selection_.best_level() == &*affine_ ? try_all_matches() : Status{};
   }
@@ -459,7 +462,7 @@ class VisibleLadder {
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
-    const Joint joint = weakest_joint(poses.reconstruction);
+    const Joint joint = weakest_sure_joint(poses.reconstruction, poses.doubtful);
     doubt_beyond(joint, poses.reconstruction, poses.doubtful);
     // A loop that a false joint closes is bent all round.
     if (joint.loose())

@@ -27,6 +27,10 @@ struct WeaklyHeldOptions {
 std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
                                       const WeaklyHeldOptions& options = {});
 
+/// The weakest joint of the model, or of its sure views alone where that is weaker: a doubtful view
+/// vouches for no other, nor for how two parts lie that it joins.
+Joint weakest_sure_joint(const Reconstruction& model, const std::vector<DoubtfulView>& doubtful);
+
 /// The views beyond a loose joint: right in themselves, but not sure where the rest is. Adds those
 /// that are not in doubt already; nothing where the joint is not loose.
 void doubt_beyond(const Joint& joint, const Reconstruction& model,

@@ -43,12 +43,15 @@ constexpr int shift_px = 3;           ///< of such a render: half a degree of a 
 /// Patches without which alignment leaves a view where it was.
 constexpr int least_matches = 12;
 
-/// The images of views that are turned away from one, spread evenly over them.
-std::vector<std::size_t> controls_of(const std::vector<PosedView>& views, std::size_t view) {
+/// The images of views that are turned away from one, spread evenly over them; those of another
+/// shape can't be laid over its render.
+std::vector<std::size_t> controls_of(const std::vector<cv::Mat>& fields,
+                                     const std::vector<PosedView>& views, std::size_t view) {
   std::vector<std::size_t> turned;
   for (std::size_t i = 0; i < views.size(); ++i)
-    if (i != view && rotation_angle_deg(views[i].cam_from_world.rotation,
-                                        views[view].cam_from_world.rotation) >= control_turn_deg)
+    if (i != view && fields[i].size() == fields[view].size() &&
+        rotation_angle_deg(views[i].cam_from_world.rotation, views[view].cam_from_world.rotation) >=
+            control_turn_deg)
       turned.push_back(i);
   if (turned.size() <= most_controls) return turned;
   std::vector<std::size_t> chosen;
@@ -65,7 +68,7 @@ constexpr std::size_t least_controls = 3;
 Result<std::optional<bool>> own_is_best(const SceneRenderer& scene,
                                         const std::vector<cv::Mat>& fields,
                                         const std::vector<PosedView>& views, std::size_t view) {
-  const std::vector<std::size_t> controls = controls_of(views, view);
+  const std::vector<std::size_t> controls = controls_of(fields, views, view);
   if (controls.size() < least_controls) return std::optional<bool>();
   ORBITFUSE_ASSIGN(const SceneRender seen, scene(narrowed_to(views[view].camera, render_width_px),
                                                  views[view].cam_from_world));

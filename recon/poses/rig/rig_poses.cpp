@@ -3,9 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <map>
+#include <tuple>
 
+#include "core/geometry/scene_ball.hpp"
 #include "recon/alignment/luminance.hpp"
 #include "recon/poses/doubts.hpp"
 #include "recon/poses/thermal_lens.hpp"
@@ -18,8 +21,28 @@ struct Gathered {
   std::vector<const PosedView*> posed;  ///< the photo of each
 };
 
+Eigen::Vector3d looked_at(const Reconstruction& model) {
+  std::vector<Rigid3d> cameras;
+  for (const PosedView& view : model.views) cameras.push_back(view.cam_from_world);
+  return scene_ball(cameras, {}).center;
+}
+
+/// A frame of the camera that took most: one odd file doesn't decide for all.
+const FrameRecord& usual_frame(const RigPairs& rig) {
+  const auto kind = [](const FrameRecord& frame) {
+    return std::tuple(frame.device, frame.width, frame.height);
+  };
+  std::map<std::tuple<std::string, int, int>, int> count;
+  for (const auto& [photo, thermal] : rig.pairs) ++count[kind(*thermal)];
+  const auto most =
+      std::max_element(rig.pairs.begin(), rig.pairs.end(), [&](const auto& a, const auto& b) {
+        return count[kind(*a.second)] < count[kind(*b.second)];
+      });
+  return *most->second;
+}
+
 Result<Gathered> gather(const Session& session, const Reconstruction& visible, const RigPairs& rig,
-                        const Camera& thermal_lens, ModalityPoses& poses) {
+                        const FrameRecord& usual, ModalityPoses& poses) {
   std::map<std::string, int> view_of;
   for (std::size_t v = 0; v < visible.views.size(); ++v)
     view_of[visible.views[v].name] = static_cast<int>(v);
@@ -29,6 +52,10 @@ Result<Gathered> gather(const Session& session, const Reconstruction& visible, c
       const auto v = static_cast<std::size_t>(o.view);
       seen[v].push_back(visible.views[v].cam_from_world * point.position);
     }
+  // Known poses come without points: the rig sees the object as far off as the cameras look.
+  if (visible.points.empty())
+    for (std::size_t v = 0; v < visible.views.size(); ++v)
+      seen[v].push_back(visible.views[v].cam_from_world * looked_at(visible));
   Gathered result;
   for (const auto& [photo, thermal] : rig.pairs) {
     const auto found = view_of.find(photo->file);
@@ -36,8 +63,10 @@ Result<Gathered> gather(const Session& session, const Reconstruction& visible, c
       poses.dropped.push_back({thermal->file, "its photo has no pose"});
       continue;
     }
-    if (thermal->width != thermal_lens.width || thermal->height != thermal_lens.height) {
-      poses.dropped.push_back({thermal->file, "it is of another size than the rig's other images"});
+    if (thermal->device != usual.device || thermal->width != usual.width ||
+        thermal->height != usual.height) {
+      poses.dropped.push_back(
+          {thermal->file, "it is of another camera or size than most of the rig's images"});
       continue;
     }
     const auto v = static_cast<std::size_t>(found->second);
@@ -66,8 +95,9 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
   result.reconstruction.modality = Modality::thermal;
   const auto frames = session.frames_of(Modality::thermal, false);
   result.frame_count = step.total = static_cast<int>(frames.size());
-  const LensGuess lens = lens_of(session, *rig.pairs.front().second);
-  ORBITFUSE_ASSIGN(const Gathered gathered, gather(session, visible, rig, lens.camera, result));
+  const LensGuess lens = lens_of(session, usual_frame(rig));
+  ORBITFUSE_ASSIGN(const Gathered gathered,
+                   gather(session, visible, rig, usual_frame(rig), result));
   RigOptions options;
   options.thermal_lens = lens.camera;
   options.focal_relative_sigma = lens.focal_relative_sigma;

@@ -296,6 +296,8 @@ Result<Reconstruction> ColmapProject::map(const Session& session,
   add("init_max_forward_motion", fmt::format("{}", settings.init_max_forward_motion));
   add("abs_pose_min_num_inliers", fmt::format("{}", settings.abs_pose_min_num_inliers));
   add("abs_pose_min_inlier_ratio", fmt::format("{}", settings.abs_pose_min_inlier_ratio));
+  // COLMAP's ten would leave no model of nine photos.
+  add("min_model_size", fmt::format("{}", std::clamp(static_cast<int>(images.size()) / 2, 3, 10)));
   add("min_num_matches", fmt::format("{}", settings.min_num_matches));
   ORBITFUSE_TRY(run(std::move(arguments), progress));
 

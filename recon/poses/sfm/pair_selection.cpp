@@ -43,9 +43,11 @@ std::vector<ViewPair> exhaustive_pairs(int count) {
 }
 
 std::vector<ViewPair> orbit_pairs(const std::vector<const FrameRecord*>& frames) {
+  // Fewer than two loops of twelve have leave a chain of few views with links missing.
+  constexpr int pairs_of_two_loops = 55;
   const int count = static_cast<int>(frames.size());
-  if (count <= 8) return exhaustive_pairs(count);
-  return nearest_pairs(frames, static_cast<std::size_t>(count * (count - 1) / 10));
+  return nearest_pairs(
+      frames, static_cast<std::size_t>(std::max(count * (count - 1) / 10, pairs_of_two_loops)));
 }
 
 std::vector<ViewPair> nearest_pairs(const std::vector<const FrameRecord*>& frames,

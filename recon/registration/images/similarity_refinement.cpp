@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/geometry/narrowed.hpp"
+#include "core/image/undistorted.hpp"
 #include "recon/alignment/edge_field.hpp"
 #include "recon/alignment/whole_view.hpp"
 #include "recon/registration/images/similarity_round.hpp"
@@ -21,7 +22,20 @@ Status one_image_each(const std::vector<cv::Mat>& images, const std::vector<Pose
               "give one image a view");
 }
 
+/// Whether the images say anything of the answer that stays.
+bool sees_answer(const SimilarityRefinement& r) {
+  const double agreement = r.improved ? r.agreement_after : r.agreement_before;
+  const int in_place = r.improved ? r.matches_after : r.matches_before;
+  return agreement > 0 && in_place >= static_cast<int>(fewest_patches);
+}
+
 }  // namespace
+
+Status straighten(cv::Mat& image, PosedView& view) {
+  ORBITFUSE_ASSIGN(image, recorded_straight(image, view.camera, view.name));
+  view.camera = view.camera.without_distortion();
+  return {};
+}
 
 Result<SimilarityRefinement> refine_similarity(const SceneRenderer& visible,
                                                const std::vector<cv::Mat>& images,
@@ -63,6 +77,7 @@ Result<SimilarityRefinement> refine_similarity(
                     result.agreement_after > result.agreement_before &&
                     result.matches_after > result.matches_before;
   if (result.improved) result.visible_from_thermal = current;
+  result.unseen = !sees_answer(result);
   return result;
 }
 

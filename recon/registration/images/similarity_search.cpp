@@ -17,6 +17,8 @@ namespace {
 constexpr int search_width_px = 128;
 /// Of a start's step from the clouds' answer: beyond that they would not have met.
 constexpr double farthest = 3;
+/// Of the scene's diameter: shifted by more than its radius, hardly anything of it would meet.
+constexpr double farthest_shift = 0.5;
 
 /// From a start to where its basin is known, and on to the basin's floor.
 std::vector<RenderRound> opening_rounds() {
@@ -89,6 +91,21 @@ Eigen::Vector3d middle(const std::vector<ScenePatch>& patches) {
   return result;
 }
 
+/// What the views see of the visible world, as large as register_clouds measures a cloud: nine of
+/// ten patches lie within the diameter.
+struct SeenScene {
+  Eigen::Vector3d middle;
+  double diameter = 0;
+};
+
+SeenScene seen_scene(const std::vector<ScenePatch>& patches) {
+  SeenScene scene{middle(patches)};
+  std::vector<double> radii;
+  for (const ScenePatch& patch : patches) radii.push_back((patch.point - scene.middle).norm());
+  scene.diameter = 2 * quantile(radii, 0.9);
+  return scene;
+}
+
 /// The visible world turned and grown about a point.
 Similarity3d about(const Eigen::Vector3d& center, double turn_deg, const Eigen::Vector3d& axis,
                    double growth) {
@@ -111,11 +128,17 @@ std::vector<ImageCandidate> starts_round(const Similarity3d& visible_from_therma
   return starts;
 }
 
-/// How far the images moved the clouds' answer, in steps of the search.
+/// How far the images turned and grew the clouds' answer, in steps of the search.
 double steps_between(const Similarity3d& a, const Similarity3d& b,
                      const SimilaritySearchOptions& options) {
   return std::max(rotation_angle_deg(a.rotation, b.rotation) / options.turn_deg,
                   std::abs(std::log(a.scale / b.scale)) / std::log1p(options.growth));
+}
+
+/// How far they shifted the scene's middle, as a share of its diameter.
+double shift_between(const Similarity3d& a, const Similarity3d& b, const SeenScene& scene) {
+  const Eigen::Vector3d shifted = (a * b.inverse()) * scene.middle;
+  return (shifted - scene.middle).norm() / scene.diameter;
 }
 
 }  // namespace
@@ -152,10 +175,14 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
   ImageCandidate first{visible_from_thermal};
   ORBITFUSE_TRY(open(seen, first));
   if (!(first.support > 0)) return finish(visible_from_thermal, similarity_rounds());
+  const SeenScene scene = seen_scene(first.patches);
   std::vector<ImageCandidate> candidates =
-      starts_round(visible_from_thermal, middle(first.patches), options);
+      starts_round(visible_from_thermal, scene.middle, options);
   ORBITFUSE_TRY(close(seen, first));
-  const double moved = steps_between(first.visible_from_thermal, visible_from_thermal, options);
+  // Growing by a step moves by that share of the scene's size too.
+  const double moved = std::max(
+      steps_between(first.visible_from_thermal, visible_from_thermal, options),
+      shift_between(first.visible_from_thermal, visible_from_thermal, scene) / options.growth);
   progress.report(
       {.stage = "register",
        .detail = fmt::format("from the clouds' answer: support {:.0f}, {:.2f} of the patches in "
@@ -183,7 +210,9 @@ Result<SimilarityRefinement> search_similarity(const SceneRenderer& visible,
   const int starts = 1 + static_cast<int>(candidates.size());
   // Clutter can draw a start to where the clouds don't meet at all.
   const auto lost = [&](const ImageCandidate& candidate) {
-    return steps_between(candidate.visible_from_thermal, visible_from_thermal, options) > farthest;
+    const Similarity3d& there = candidate.visible_from_thermal;
+    return steps_between(there, visible_from_thermal, options) > farthest ||
+           shift_between(there, visible_from_thermal, scene) > farthest_shift;
   };
   const auto better = [](const ImageCandidate& a, const ImageCandidate& b) {
     return a.support > b.support;

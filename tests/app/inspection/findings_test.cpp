@@ -95,6 +95,7 @@ TEST(InspectionFindings, ReferencesThatAreNoneAreNamed) {
   ASSERT_TRUE(list->front().comparison);
   EXPECT_FALSE(list->front().comparison->known());
   EXPECT_THAT(list->front().comparison->with, HasSubstr("gone (no longer saved)"));
+  EXPECT_TRUE(list->front().comparison->reference_gone);
 }
 
 TEST(InspectionFindings, WhatNoFrameSawHasNoDifference) {
@@ -103,6 +104,7 @@ TEST(InspectionFindings, WhatNoFrameSawHasNoDifference) {
   ASSERT_TRUE(list) << list.error().message();
   EXPECT_FALSE((*list)[0].reading().seen());
   EXPECT_FALSE((*list)[0].comparison->known());
+  EXPECT_FALSE((*list)[0].comparison->reference_gone);
   EXPECT_FALSE((*list)[0].comparison->priority);
 }
 

@@ -122,6 +122,25 @@ TEST(InspectionHtml, APlaceThatNothingSeesSaysSo) {
   EXPECT_THAT(html, Not(HasSubstr("nan")));
 }
 
+TEST(InspectionHtml, WhyThereIsNoComparisonIsSaid) {
+  auto hot = spot_at("hot", 320);
+  hot.reference = "gone";
+  const std::string gone = to_html(model_of({hot}, ""));
+  EXPECT_THAT(gone, HasSubstr("its reference is no longer saved"));
+  EXPECT_THAT(gone, Not(HasSubstr("saw one of the two")));
+  hot.reference = "dark";
+  const std::string unseen = to_html(model_of({hot, unseen_spot("dark")}, ""));
+  EXPECT_THAT(unseen, HasSubstr("no thermal frame saw one of the two"));
+  EXPECT_THAT(unseen, Not(HasSubstr("no longer saved")));
+}
+
+TEST(InspectionHtml, HatchingIsExplainedUnderThePicturesThatHaveSome) {
+  InspectionModel model = model_of({spot_at("hot", 320)}, "");
+  EXPECT_THAT(to_html(model), Not(HasSubstr("hatched")));
+  model.findings[0].pictures.thermal_is_hatched = true;
+  EXPECT_THAT(to_html(model), HasSubstr("the frame as recorded; hatched: not measured"));
+}
+
 TEST(InspectionHtml, WithoutMeasurementsItSaysSo) {
   EXPECT_THAT(to_html(model_of({}, "")), HasSubstr("No measurement is saved"));
 }

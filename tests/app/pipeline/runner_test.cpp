@@ -401,6 +401,23 @@ TEST_F(RunnerTest, WhatWasMadeOfEarlierResultsIsNamed) {
   EXPECT_THAT(out_of_date(temp.path() / "none", all), ElementsAre());
 }
 
+TEST_F(RunnerTest, WhatIsTakenAsItLiesIsLeftOutWhereItWasMadeOfAnEarlierStage) {
+  run();
+  RunOptions only_c;
+  only_c.targets = {"c"};
+  only_c.targets_only = true;
+  EXPECT_EQ(run(only_c).find("b")->state, StageState::unchanged);
+  a_option = 2;
+  RunOptions only_a;
+  only_a.targets = {"a"};
+  run(only_a);
+  const RunSummary summary = run(only_c);
+  EXPECT_EQ(summary.find("a")->state, StageState::unchanged);
+  EXPECT_EQ(summary.find("b")->state, StageState::absent);
+  EXPECT_THAT(summary.find("b")->why, HasSubstr("made of an earlier a"));
+  EXPECT_TRUE(runs.empty()) << "c reads b";
+}
+
 TEST_F(RunnerTest, AFileInAStageIsToldFromOneBesideIt) {
   ASSERT_FALSE(run().error);
   const fs::path out = temp.path() / "out";

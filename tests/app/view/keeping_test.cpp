@@ -156,6 +156,20 @@ TEST_F(FilmTest, PicturesAreNumberedAndComplete) {
   EXPECT_THAT(finished().at("file").get<std::string>(), HasSubstr("002"));
 }
 
+/// Black would be the palette's coldest colour.
+TEST_F(FilmTest, WhatIsNotMeasuredIsHatched) {
+  run.config.render.min_opacity = 2;  // nothing is
+  ASSERT_TRUE(films.begin(order, views));
+  ASSERT_TRUE(finished().contains("file"));
+  const auto image = read_image(folder / "films/001/00000.png");
+  ASSERT_TRUE(image);
+  const int plain = cv::countNonZero(image->reshape(1) == 128),
+            stripes = cv::countNonZero(image->reshape(1) == 96);
+  EXPECT_GT(plain, stripes);
+  EXPECT_GT(stripes, 0);
+  EXPECT_EQ(plain + stripes, 3 * 64 * 64);
+}
+
 TEST_F(FilmTest, Mp4IsAFilm) {
   order.kind = FilmKind::mp4;
   order.layer = FilmLayer::fused;

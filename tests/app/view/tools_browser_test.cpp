@@ -142,11 +142,36 @@ TEST_F(ViewBrowserTest, IsothermOpacityAndSwipeChangeThePicture) {
   EXPECT_TRUE(page.errors().empty()) << page.errors().front();
 }
 
+/// What was typed stays the temperature that it was.
+TEST_F(ViewBrowserTest, TypedTemperaturesFollowTheUnit) {
+  Browser page(folder.path() / "profile", 640, 480, false);
+  open(page, url);
+  const auto unit = [&](const std::string& chosen) {
+    page.evaluate("$('unit').value = '" + chosen + "'; $('unit').onchange()");
+    return page.evaluate("[$('reflected').value, $('air').value, $('recorded-reflected').value]");
+  };
+  page.evaluate("$('reflected').value = '20'; $('air').value = 'cold'");
+  EXPECT_EQ(unit("F"), (json{"68", "cold", ""}));
+  EXPECT_EQ(page.evaluate("$('reflected').parentElement.textContent"), "reflected, °F ");
+  EXPECT_EQ(unit("K"), (json{"293.15", "cold", ""}));
+  page.evaluate("$('air').value = '278.15'");
+  EXPECT_NEAR(page.evaluate("viewer.measuring.parameters().object.reflected_k").get<double>(),
+              293.15, 1e-9);
+  EXPECT_EQ(unit("C"), (json{"20", "5", ""}));
+  EXPECT_EQ(page.evaluate("$('air').parentElement.textContent"), "air, °C ");
+  EXPECT_TRUE(page.errors().empty()) << page.errors().front();
+}
+
 /// Two views that are kept, and a film from the one to the other, with its progress.
 TEST_F(ViewBrowserTest, AFilmGoesAlongTheKeptViews) {
   Browser page(folder.path() / "profile", 640, 480, false);
   open(page, url);
   EXPECT_EQ(page.evaluate("$('film').disabled"), true);
+  for (const char* layer : {"mix", "fused"}) {
+    choose(page, layer);
+    EXPECT_EQ(page.evaluate("$('film-layer').hidden"), std::string(layer) == "fused")
+        << "the overlay's film is another layer's, which is said";
+  }
   for (const char* name : {"one", "two"}) {
     page.evaluate(std::string("$('bookmark-name').value = '") + name + "'; $('bookmark').click()");
     ASSERT_TRUE(

@@ -2,8 +2,11 @@
 // The viewer of a real run in a real browser without a screen: pixels and values are looked at.
 #include <cstdlib>
 
+#include "app/pipeline/stage_record.hpp"
 #include "app/stages/artifacts.hpp"
 #include "app/stages/measurement_scene.hpp"
+#include "app/stages/metric_scale.hpp"
+#include "app/view/measuring.hpp"
 #include "core/temperature.hpp"
 #include "tests/app/view/view_browser_fixture.hpp"
 
@@ -324,6 +327,48 @@ TEST_F(ViewBrowserTest, ShowsAndMeasuresInOneWorld) {
     }
     EXPECT_GT(compared, 5);
   }
+}
+
+/// Both may be made while the viewer is open: a scale, and the run itself.
+TEST_F(ViewBrowserTest, MeasuresInTheScaleAndTheRunOfNow) {
+  const auto run = load_finished_run(out, stages::RunConfig(), {});
+  ASSERT_TRUE(run) << run.error().message();
+  Measuring measuring(*run);
+  nlohmann::json places = nlohmann::json::array();
+  for (const double share : {0.0, 0.1}) {
+    const Eigen::Vector3d at = run->center + share * run->radius * Eigen::Vector3d::UnitX();
+    places.push_back({{"point", {at.x(), at.y(), at.z()}}});
+  }
+  const nlohmann::json asked = {{"kind", "distance"}, {"places", places}, {"name", "width"}};
+  const auto added = measuring.add(asked, nullptr);
+  ASSERT_TRUE(added) << added.error().message();
+  const auto check = [&](std::optional<double> metres) {
+    const auto saved = measuring.list(), asked_again = measuring.answer(asked, nullptr);
+    ASSERT_TRUE(saved) << saved.error().message();
+    ASSERT_TRUE(asked_again) << asked_again.error().message();
+    for (const nlohmann::json& answer : {saved->at(0).at("answer"), asked_again->at("answer")}) {
+      if (metres)
+        EXPECT_NEAR(answer.at("distance_m").get<double>(),
+                    *metres * answer.at("distance").get<double>(), 1e-9);
+      else
+        EXPECT_TRUE(answer.at("distance_m").is_null());
+    }
+  };
+  check(std::nullopt);
+  for (const double metres : {2.0, 3.0}) {
+    ASSERT_TRUE(stages::save_metric_scale(out, *stages::world_identity(out),
+                                          {metres, 0.01, "one distance", "of this test"}));
+    check(metres);
+  }
+  fs::remove(out / stages::scale_file);
+  check(std::nullopt);
+  auto record = pipeline::read_stage_record(out / "train_visible");
+  ASSERT_TRUE(record);
+  record->outputs.front().hash = "of another training";
+  ASSERT_TRUE(pipeline::write_stage_record(out / "train_visible", *record));
+  const auto refused = measuring.list();
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().found.find("made again"), std::string::npos);
 }
 
 /// Ctrl-C is how it ends; what cannot be shown is named.

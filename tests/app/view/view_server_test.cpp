@@ -18,6 +18,7 @@
 
 #include "app/stages/rendered_views.hpp"
 #include "app/view/layers.hpp"
+#include "app/view/measuring.hpp"
 #include "app/view/scene_json.hpp"
 #include "app/view/shot_request.hpp"
 #include "core/image/image_codec.hpp"
@@ -132,6 +133,34 @@ TEST_F(ViewServerTest, SceneTellsWhatThereIs) {
   std::memcpy(&count, surface.data(), 4);
   EXPECT_EQ(count, 1000u);
   EXPECT_EQ(surface.size(), 28u + 1000 * 11);
+}
+
+TEST_F(ViewServerTest, SceneTellsTheScaleOfNow) {
+  serve();
+  const auto notes = [&] { return json::parse(client().Get("/scene")->body).at("notes").dump(); };
+  EXPECT_THAT(notes(), HasSubstr("no scale in metres is known"));
+  orbitfuse::test::put(folder / "scale.json", "{");
+  EXPECT_THAT(notes(), HasSubstr("its scale can't be used"));
+}
+
+/// Its places would be others than those that the viewer shows.
+TEST(Measuring, ARunThatWasMadeAgainIsRefused) {
+  const orbitfuse::test::TempFolder folder;
+  FinishedRun run;
+  run.out = folder.path();
+  run.session.emplace();
+  run.identity = *identity_of_run(run.out);
+  Measuring measuring(run);
+  const auto same = measuring.list();
+  ASSERT_FALSE(same);
+  EXPECT_THAT(same.error().found, HasSubstr("no thermal frames"));
+  run.identity = "of other fields";
+  const auto again = measuring.list();
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().kind, ErrorKind::input);
+  EXPECT_EQ(again.error().where, folder.path().string());
+  EXPECT_THAT(again.error().found, HasSubstr("made again since the viewer was opened"));
+  EXPECT_THAT(again.error().remedy, HasSubstr("open the viewer again"));
 }
 
 /// The page's camera and the recorded one are the same, and so are the temperatures that reach it

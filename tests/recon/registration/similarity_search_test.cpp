@@ -56,6 +56,7 @@ TEST(SimilaritySearch, ComesHomeFromWhereOneStartDoesNot) {
       search_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views, start, {}, {});
   ASSERT_TRUE(searched) << searched.error().message();
   EXPECT_TRUE(searched->improved);
+  EXPECT_FALSE(searched->unseen);
   EXPECT_EQ(searched->starts, 9);
   EXPECT_GT(searched->agreement_after, single->agreement_after);
   const Similarity3d error = left(*searched, orbit);
@@ -76,8 +77,24 @@ TEST(SimilaritySearch, ADecisiveAnswerOfTheCloudsIsNotSearchedRound) {
   ASSERT_EQ(found->skips.size(), 1U);
   EXPECT_EQ(found->skips[0].effect, "8 starts not tried");
   EXPECT_TRUE(found->improved);
+  EXPECT_FALSE(found->unseen);
   EXPECT_LT(turn_deg(left(*found, orbit)), 0.3);
   EXPECT_NEAR(left(*found, orbit).scale, 1, 0.004);
+}
+
+TEST(SimilaritySearch, CloudsThatTheImagesShiftAreNotConfirmed) {
+  const ThermalOrbit orbit;
+  // Neither turned nor grown, but off by more than a step of the search.
+  const Similarity3d shift{1, Eigen::Quaterniond::Identity(), {0.04, -0.04, 0.04}};
+  SimilaritySearchOptions options;
+  options.clouds_decide = true;
+  const auto found = search_similarity(testing_orbit::box_renderer(), orbit.images, orbit.views,
+                                       shift * orbit.visible_from_thermal, options, {});
+  ASSERT_TRUE(found) << found.error().message();
+  EXPECT_EQ(found->starts, 9);
+  EXPECT_TRUE(found->skips.empty());
+  EXPECT_TRUE(found->improved);
+  EXPECT_LT(left(*found, orbit).translation.norm(), 0.01);
 }
 
 TEST(SimilaritySearch, NothingToSeeLeavesTheCloudsAnswer) {
@@ -87,6 +104,7 @@ TEST(SimilaritySearch, NothingToSeeLeavesTheCloudsAnswer) {
                                        orbit.visible_from_thermal, {}, {});
   ASSERT_TRUE(found) << found.error().message();
   EXPECT_FALSE(found->improved);
+  EXPECT_TRUE(found->unseen);
   EXPECT_EQ(found->visible_from_thermal.matrix(), orbit.visible_from_thermal.matrix());
 }
 
@@ -95,6 +113,7 @@ TEST(SimilaritySearch, NoViewsLeaveItToo) {
   const auto found = search_similarity(testing_orbit::box_renderer(), {}, {}, clouds, {}, {});
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->improved);
+  EXPECT_FALSE(found->unseen) << "nobody looked";
   EXPECT_EQ(found->visible_from_thermal.matrix(), clouds.matrix());
 }
 

@@ -8,6 +8,8 @@
 #include <numeric>
 #include <random>
 
+#include "recon/poses/estimate/weakly_held.hpp"
+
 namespace orbitfuse {
 namespace {
 
@@ -101,6 +103,22 @@ TEST(WeakestJoint, OfPointsOfTwoViewsIsLoose) {
 
   two.share({4, 9, 11}, 100);
   EXPECT_FALSE(weakest_joint(two.model).loose());
+}
+
+TEST(WeakestSureJoint, ADoubtfulViewJoinsNoParts) {
+  Joints two(13);
+  two.walk(0, 6, 100);
+  two.walk(7, 6, 100);
+  for (int v = 4; v <= 6; ++v) two.share({v, v + 1, v + 2}, 100);
+  EXPECT_FALSE(weakest_sure_joint(two.model, {}).loose());
+  const Joint joint =
+      weakest_sure_joint(two.model, {{"6", DoubtReason::few_common_points, "for the test"}});
+  EXPECT_TRUE(joint.loose());
+  EXPECT_EQ(joint.points, 0);
+  EXPECT_EQ(joint.views_beyond, 6);
+  EXPECT_EQ(joint.beyond.size(), 13u);
+  EXPECT_EQ(joint.beyond[6], 0);
+  EXPECT_NE(joint.beyond[5], joint.beyond[7]);
 }
 
 TEST(WeakestJoint, PartsThatNothingJoinsAreLoose) {
