@@ -182,8 +182,11 @@ class Gathering {
                               known->second.all().front().file.string()),
                   twice.empty() ? "give the poses of these images, or none"
                                 : "give each image one pose and a name of its own");
-    remarks_.add(
-        fmt::format("{}: {}; the others are left to the pose stage", name(modality), found));
+    remarks_.add(fmt::format("{}: {}; {}", name(modality), found,
+                             with_pose == 1
+                                 ? "it is not used: all poses are estimated"
+                                 : "the others stay without one, unless all are estimated: --set "
+                                   "poses.use_known_poses=false"));
     return {};
   }
 

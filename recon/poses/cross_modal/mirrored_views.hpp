@@ -32,7 +32,8 @@ struct MirroredSupport {
 /// Of fewer the true start may be missed, and the spread of their supports is itself chance.
 inline constexpr std::size_t least_for_mirrored = 16;
 
-/// Nothing where a few renders already say that the views aren't mirrored, and of too few views. Errors: the renderer's, cancelled.
+/// Nothing where a few renders already say that the views aren't mirrored, and of too few views.
+/// Errors: the renderer's, cancelled.
 Result<std::optional<MirroredSupport>> support_if_mirrored(const SceneRenderer& renderer,
                                                            const ChosenOrbit& chosen,
                                                            const Progress& progress);

@@ -446,6 +446,18 @@ class VisibleLadder {
     return {};
   }
 
+  static void doubt_loose_part(ModalityPoses& poses) {
+    const Joint joint = weakest_sure_joint(poses.reconstruction, poses.doubtful);
+    doubt_beyond(joint, poses.reconstruction, poses.doubtful);
+    // A loop that a false joint closes is bent all round.
+    if (joint.loose())
+      poses.warnings.push_back(fmt::format(
+          "{} photos hang on the others by {} points{}: should these be mistaken, they may have "
+          "bent the sure ones too; take photos between the doubtful ones and the rest",
+          joint.views_beyond, joint.points,
+          joint.views_of_point > 2 ? " that three photos see" : ""));
+  }
+
   Result<ModalityPoses> answer() {
     if (!selection_.has_best()) {
       auto error = none_held(steps_, Modality::visible, workdir_);
@@ -462,21 +474,13 @@ class VisibleLadder {
     for (DroppedView& view : poses.dropped)
       if (featureless_.contains(view.name)) view.why = fmt::format("it {}", featureless_why);
     poses.doubtful = weakly_held(poses.reconstruction);
-    const Joint joint = weakest_sure_joint(poses.reconstruction, poses.doubtful);
-    doubt_beyond(joint, poses.reconstruction, poses.doubtful);
-    // A loop that a false joint closes is bent all round.
-    if (joint.loose())
-      poses.warnings.push_back(fmt::format(
-          "{} photos hang on the others by {} points{}: should these be mistaken, they may have "
-          "bent the sure ones too; take photos between the doubtful ones and the rest",
-          joint.views_beyond, joint.points,
-          joint.views_of_point > 2 ? " that three photos see" : ""));
     if (poses.posed_ratio() < options_.min_posed_ratio)
       poses.warnings.push_back(fmt::format(
           "{} of {} photos have a place, {:.0f} % are asked for (poses.min_posed_ratio): the "
           "stations agree with these, and no attempt placed more",
           poses.reconstruction.views.size(), total_, 100 * options_.min_posed_ratio));
     ORBITFUSE_TRY(spared(doubt_placed_elsewhere(poses)));
+    doubt_loose_part(poses);
     const auto all = static_cast<int>(exhaustive_pairs(total_).size()),
                pairs = selection_.best_level().pairs();
     if (pairs < all)

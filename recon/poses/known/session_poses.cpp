@@ -101,6 +101,11 @@ Result<ModalityPoses> known_poses(const Session& session, Modality modality) {
   poses.ladder.push_back(
       {"known poses", true, "the session carries them", posed, poses.frame_count, 0.0});
   poses.gates["posed_ratio"] = poses.posed_ratio();
+  if (poses.posed_ratio() < PoseOptions{}.min_posed_ratio)
+    poses.warnings.push_back(
+        fmt::format("{} of {} {} frames have a known pose that is used, the others none: to "
+                    "estimate all from the images, set poses.use_known_poses = false (--set)",
+                    posed, poses.frame_count, name(modality)));
   poses.skips.push_back({fmt::format("{} pose estimation", name(modality)),
                          fmt::format("the session carries {} poses", posed),
                          "no structure from motion"});
