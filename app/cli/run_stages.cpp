@@ -60,6 +60,8 @@ void announce(terminal::Console& console, const StageStatus& s, bool dry_run) {
     case StageState::absent:
     case StageState::blocked:
       console.info(fmt::format("{:<14} not run: {}", s.stage, s.why));
+      for (const std::string& warning : s.output.warnings)
+        console.warning(s.stage + ": " + warning);
       break;
     case StageState::failed:
       // What to do comes last, where the program ends with it.

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "app/pipeline/out_folder.hpp"
 #include "app/stages/artifacts.hpp"
+#include "app/stages/learned_views.hpp"
 #include "app/stages/recorded_detail.hpp"
 #include "core/formats/colmap_model.hpp"
 #include "core/formats/transforms_json.hpp"
@@ -73,34 +75,36 @@ Result<cv::Mat> rendered_kelvin(const view::FinishedRun& run, RunDetail& detail,
   return seen.color;
 }
 
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
 struct Cameras {
   std::vector<PosedView> views;  ///< in the run's world
   std::string described;
 };
 
+/// Of photos in doubt those are left out that the field did not learn from: their pairs would be
+/// rendered from where they were not taken.
 Result<Cameras> cameras_of(const view::FinishedRun& run, const DatasetOptions& options) {
   Cameras cameras;
-  std::size_t recorded = 0, doubtful = 0;
+  ORBITFUSE_ASSIGN(const stages::LearnedViews learned,
+                   stages::learned_views(stages::context_of_run(run.out), Modality::visible));
+  std::size_t doubtful = 0;
   for (const view::RecordedView& v : run.views) {
-    if (v.modality != Modality::visible) continue;
-    ++recorded;
-    // Its pair would be rendered from where the photo was not taken.
-    if (v.doubt)
-      ++doubtful;
-    else
-      cameras.views.push_back(v.view);
+    if (v.modality != Modality::visible || contains(learned.left_out, v.view.name)) continue;
+    cameras.views.push_back(v.view);
+    doubtful += v.doubt ? 1 : 0;
   }
-  if (cameras.views.empty())
-    return fail(ErrorKind::input, "dataset",
-                fmt::format("the poses of all {} photos are in doubt", recorded),
-                "see why in the report; take views between them");
+  std::string doubts;
+  if (!learned.left_out.empty())
+    doubts += fmt::format(", {} left out whose poses are in doubt", learned.left_out.size());
+  if (doubtful > 0) doubts += fmt::format(", the poses of {} of them in doubt", doubtful);
   if (options.poses == DatasetPoses::recorded) {
     if (!run.session)
       return fail(ErrorKind::input, "dataset", "the session is not where the run read it",
                   "bring it back, or take new poses: --poses new");
-    cameras.described = fmt::format("{} recorded views", cameras.views.size());
-    if (doubtful > 0)
-      cameras.described += fmt::format(", {} left out whose poses are in doubt", doubtful);
+    cameras.described = fmt::format("{} recorded views{}", cameras.views.size(), doubts);
     return cameras;
   }
   ORBITFUSE_ASSIGN(NewViews fresh, new_views(cameras.views, options.path));

@@ -35,7 +35,8 @@ measurement::SurfaceSource surface_of(const view::FinishedRun& run) {
 }
 
 Error of_usage(Error error) {
-  if (error.kind == ErrorKind::input) error.kind = ErrorKind::usage;
+  if (error.kind != ErrorKind::input) return error;
+  error.kind = ErrorKind::usage;
   error.where = "--distance: " + error.where;
   return error;
 }

@@ -170,17 +170,29 @@ StageContext Runner::context(fs::path folder, bool resume) const {
   return context;
 }
 
-/// Damaged, or made of what has been made anew since.
-std::optional<std::string> Runner::unfit_as_it_lies(const std::string& stage,
-                                                    const StageRecord& record) const {
-  if (auto wrong = damage(options_.out / stage, record)) return wrong;
+/// The stage that has been made anew since, if there is one.
+std::optional<std::string> Runner::earlier_input(const StageRecord& record) const {
   for (const auto& [name, hash] : record.inputs) {
     const auto input = outputs_.find(name);
-    if (unfit_.contains(name) || (input != outputs_.end() && input->second != hash))
-      return fmt::format("it was made of an earlier {}: bring the run up to date, orbitfuse run",
-                         name);
+    if (outdated_.contains(name) || (input != outputs_.end() && input->second != hash)) return name;
   }
   return std::nullopt;
+}
+
+/// Of a stage that is taken as it lies: why it can't be. What was made of earlier results is told
+/// as a warning too, since it was there yesterday.
+std::optional<std::string> Runner::unfit_as_it_lies(const Stage& stage,
+                                                    const Result<StageRecord>& record,
+                                                    StageStatus& status) {
+  if (!record) return "it has not run yet";
+  if (auto wrong = damage(options_.out / stage.name, *record)) return wrong;
+  const std::optional<std::string> earlier = earlier_input(*record);
+  if (!earlier) return std::nullopt;
+  outdated_.insert(stage.name);
+  status.output.warnings.push_back(
+      fmt::format("left out, for it was made of an earlier {}; make it anew: orbitfuse run {}",
+                  *earlier, options_.out.string()));
+  return "it was made of an earlier " + *earlier;
 }
 
 StageStatus Runner::visit(const Stage& stage) {
@@ -221,10 +233,7 @@ StageStatus Runner::visit(const Stage& stage) {
   const auto record = read_stage_record(options_.out / stage.name);
   const bool as_it_lies = !writes(stage.name);
   if (as_it_lies) {
-    const std::optional<std::string> wrong =
-        record ? unfit_as_it_lies(stage.name, *record) : "it has not run yet";
-    if (wrong) {
-      if (record) unfit_.insert(stage.name);
+    if (const auto wrong = unfit_as_it_lies(stage, record, status)) {
       status.state = StageState::absent;
       status.why = *wrong;
       return status;

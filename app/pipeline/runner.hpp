@@ -63,8 +63,9 @@ class Runner {
   StageContext context(std::filesystem::path folder, bool resume) const;
   std::optional<EarlierResult> earlier_result(const Stage& stage, const Key& key) const;
   Status remove_all() const;
-  std::optional<std::string> unfit_as_it_lies(const std::string& stage,
-                                              const StageRecord& record) const;
+  std::optional<std::string> earlier_input(const StageRecord& record) const;
+  std::optional<std::string> unfit_as_it_lies(const Stage& stage, const Result<StageRecord>& record,
+                                              StageStatus& status);
   StageStatus visit(const Stage& stage);
   StageStatus execute(const Stage& stage, const Key& key, std::string why);
   /// None: what it made still holds.
@@ -77,7 +78,7 @@ class Runner {
   std::vector<std::string> closure_;
   std::vector<StageStatus> statuses_;
   std::map<std::string, std::string> outputs_;  ///< done stage -> outputs hash
-  std::set<std::string> unfit_;                 ///< stages that are left as they lie, and aside
+  std::set<std::string> outdated_;  ///< left aside: made of stages that were made anew since
 };
 
 /// The targets (empty: all) and all they read, in order.

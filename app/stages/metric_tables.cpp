@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace orbitfuse::stages {
 using nlohmann::json;
@@ -58,6 +59,14 @@ std::string MetricMeans::csv() const {
     for (const MetricValue& value : row.values)
       text += fmt::format("{},{},{},{}\n", row.group, row.image, value.name, value.value);
   return text;
+}
+
+void take_out_alike(double share, std::vector<MetricValue>& values) {
+  for (MetricValue& value : values) {
+    if (value.name == "PSNR") value.value += 10 * std::log10(1 - share);
+    if (value.name == "SSIM" || value.name == "hist")
+      value.value = (value.value - share) / (1 - share);
+  }
 }
 
 cv::Mat gray_of_kelvin(const cv::Mat& kelvin, TemperatureSpan span) {

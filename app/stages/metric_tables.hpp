@@ -39,6 +39,11 @@ class MetricMeans {
 };
 
 /// Kelvin over the span as CV_8UC1; NaN becomes 0.
+/// Brings metrics of a pair that was made alike in a share of its pixels, for they are dead in the
+/// truth, to what they are of the others: PSNR by the mean of squares, SSIM and histogram
+/// intersection, which count what is alike as 1, by the mean. Of the others it says nothing.
+void take_out_alike(double share, std::vector<MetricValue>& values);
+
 cv::Mat gray_of_kelvin(const cv::Mat& kelvin, TemperatureSpan span);
 
 }  // namespace orbitfuse::stages

@@ -80,6 +80,7 @@ Status score_field(const StageContext& context, const StageInputs& in, Modality 
     ORBITFUSE_TRY(
         detail.add(field, view.camera, view.cam_from_world, seen, context.progress, view.name));
     cv::Mat truth = view.image, rendered = seen.color;
+    double dead_share = 0;
     if (const auto curve = trained.gray_curves.find(view.name); curve != trained.gray_curves.end())
       truth = nerf::to_common_levels(truth, curve->second);
     if (modality == Modality::visible) {
@@ -101,12 +102,14 @@ Status score_field(const StageContext& context, const StageInputs& in, Modality 
         scores.field_alone_k.add(truth, field_alone + shading);
       }
       const TemperatureSpan span = common_span({truth}, 0, 100);
-      // What one of them doesn't know says nothing of the other: alike there.
-      const cv::Mat blind = (truth != truth) | (rendered != rendered);
-      truth = gray_of_kelvin(truth, span).setTo(0, blind);
-      rendered = gray_of_kelvin(rendered, span).setTo(0, blind);
+      const cv::Mat dead = truth != truth;
+      dead_share = cv::countNonZero(dead) / static_cast<double>(dead.total());
+      truth = gray_of_kelvin(truth, span);
+      rendered = gray_of_kelvin(rendered, span).setTo(0, dead);
     }
-    ORBITFUSE_ASSIGN(const auto values, render_metrics(truth, rendered));
+    if (dead_share == 1) continue;
+    ORBITFUSE_ASSIGN(auto values, render_metrics(truth, rendered));
+    take_out_alike(dead_share, values);
     scores.means.add(std::string(name(modality)), view.name, values);
   }
   return {};

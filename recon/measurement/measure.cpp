@@ -227,8 +227,8 @@ Result<Answer> measure_polygon(const ThermalScene& scene, const Request& request
 Result<Answer> measure_line(const ThermalScene& scene, const Request& request,
                             const Reradiometry& radiometry, const Progress& progress) {
   ORBITFUSE_ASSIGN(const CommonView line, common_view(scene, request, progress));
-  constexpr double shortest_px =
-      0.5;  // within it a profile is one place, as often as it has points
+  // Within it a profile is one place, as often as it has points.
+  constexpr double shortest_px = 0.5;
   if ((line.pixels[1] - line.pixels[0]).norm() < shortest_px)
     return fail(ErrorKind::input, "line in " + line.view->name, "its two ends are one place there",
                 "choose ends that are apart, or measure a spot");

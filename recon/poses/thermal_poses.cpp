@@ -17,11 +17,14 @@ namespace orbitfuse {
 
 namespace {
 
+/// Whether thermal frames may be posed by their images alone, in a world of their own.
+enum class WithoutPhotos { last, no };
+
 /// From the images, but not as one rig; `steps` holds what was tried before.
 Result<ThermalPoses> estimated_apart(const Session& session, const VisibleScene* visible,
                                      const PoseOptions& options,
                                      const std::filesystem::path& workdir, const Progress& progress,
-                                     std::vector<LadderStep> steps) {
+                                     std::vector<LadderStep> steps, WithoutPhotos without) {
   const auto frames = session.frames_of(Modality::thermal, options.use_tracking_frames);
   if (visible != nullptr) {
     const std::size_t tried = steps.size();
@@ -34,6 +37,7 @@ Result<ThermalPoses> estimated_apart(const Session& session, const VisibleScene*
     if (steps.size() == tried)
       steps.push_back({"cross-modal, orbit prior", false, localised.error().found, 0,
                        static_cast<int>(frames.size()), 0});
+    if (without == WithoutPhotos::no) return localised;
   }
   auto alone =
       structure_from_motion(session, frames, options, workdir / "thermal", progress, steps);
@@ -49,7 +53,8 @@ Result<ThermalPoses> estimated_apart(const Session& session, const VisibleScene*
 /// From the images; `steps` holds what was tried before.
 Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visible,
                                const PoseOptions& options, const std::filesystem::path& workdir,
-                               const Progress& progress, std::vector<LadderStep> steps) {
+                               const Progress& progress, std::vector<LadderStep> steps,
+                               WithoutPhotos without = WithoutPhotos::last) {
   const auto frames = session.frames_of(Modality::thermal, options.use_tracking_frames);
   if (frames.size() < 2)
     return fail(ErrorKind::input, session.folder.string(),
@@ -71,8 +76,8 @@ Result<ThermalPoses> estimated(const Session& session, const VisibleScene* visib
     }
   }
   const std::string no_rig = rig.declared && !steps.empty() ? steps.back().why : std::string();
-  ORBITFUSE_ASSIGN(ThermalPoses poses,
-                   estimated_apart(session, visible, options, workdir, progress, std::move(steps)));
+  ORBITFUSE_ASSIGN(ThermalPoses poses, estimated_apart(session, visible, options, workdir, progress,
+                                                       std::move(steps), without));
   if (!no_rig.empty())
     poses.warnings.push_back("the session says that its cameras are one rig, but " + no_rig +
                              ": the thermal frames were posed as if shot apart");
@@ -115,24 +120,17 @@ Result<ThermalPoses> from_images(const Session& session, const VisibleScene* vis
           used + " was used");
     return poses;
   };
-  std::optional<ThermalPoses> spaced;
   if (const auto spacing_deg = spacing_by_photos(session, *visible)) {
+    // Thermal images alone, which know no spacing, come after the order.
     auto poses = estimated(at_spacing(session, Modality::thermal, *spacing_deg), visible, options,
-                           workdir / "spacing", progress, steps);
-    if (!poses && poses.error().kind != ErrorKind::quality) return poses;
-    if (poses) {
-      spaced = *said(std::move(poses),
-                     fmt::format("the photos' own spacing, {:.4g} degrees,", *spacing_deg));
-      if (spaced->shares_visible_frame) return *std::move(spaced);
-    }
+                           workdir / "spacing", progress, steps, WithoutPhotos::no);
+    if (poses || poses.error().kind != ErrorKind::quality)
+      return said(std::move(poses),
+                  fmt::format("the photos' own spacing, {:.4g} degrees,", *spacing_deg));
   }
-  auto ordered = said(estimated(in_order_alone(session, Modality::thermal), visible, options,
-                                workdir, progress, steps),
-                      "the order alone");
-  const bool given_up = !ordered && ordered.error().kind != ErrorKind::quality;
-  // A world of their own is worth less than a place among the photos.
-  if (given_up || !spaced || (ordered && ordered->shares_visible_frame)) return ordered;
-  return *std::move(spaced);
+  return said(estimated(in_order_alone(session, Modality::thermal), visible, options, workdir,
+                        progress, steps),
+              "the order alone");
 }
 
 /// Known thermal poses of a world that no photos' are of.
@@ -142,7 +140,9 @@ void tell_unchecked(bool photos_are_posed, ModalityPoses& known) {
         "nothing checks the known thermal poses: the photos' poses are not of their world; give "
         "the photos' as well, or let both be estimated: --set poses.use_known_poses=false");
   known.skips.push_back({"check of the known thermal poses",
-                         "no photos have known poses in the same world", "taken as they are"});
+                         photos_are_posed ? "no photos have known poses in the same world"
+                                          : "there are no posed photos",
+                         "taken as they are"});
 }
 
 /// Known poses that nothing confirms and nothing can replace.

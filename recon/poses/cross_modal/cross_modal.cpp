@@ -376,9 +376,10 @@ Result<ThermalPoses> localise_in_visible(const Session& session, const VisibleSc
                             fmt::format("{} of {} frames are posed", wanted, frames.size()),
                             "they lie between the others"});
   if (options.check_mirrored && stations.size() < least_for_mirrored)
-    result.skips.push_back({"check for mirrored images",
-                            fmt::format("{} views, {} say so", stations.size(), least_for_mirrored),
-                            "images that the camera mirrored would not be noticed"});
+    result.skips.push_back(
+        {"check for mirrored images",
+         fmt::format("{} views; {} are needed", stations.size(), least_for_mirrored),
+         "images that the camera mirrored would not be noticed"});
   result.skips.push_back({"thermal COLMAP", "thermal views were placed in the visible scene",
                           "no feature matching; one frame for both modalities"});
   return result;

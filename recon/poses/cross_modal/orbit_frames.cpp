@@ -58,9 +58,7 @@ Result<OrbitFrames> orbit_frames(const std::vector<const FrameRecord*>& frames, 
   Lens lens = most_common(frames, has_station);
   orbit.stations = of(lens, has_station);
   const std::size_t with_station = orbit.stations.size();
-  // A few views' stations don't cost the others, whose order says where they are.
-  const bool declared =
-      with_station >= min_stations && 2 * with_station >= of(lens, is_view).size();
+  const bool declared = with_station >= min_stations;
   if (!declared) {
     lens = most_common(frames, is_view);
     orbit.stations = of(lens, is_view);

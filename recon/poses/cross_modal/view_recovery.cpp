@@ -199,7 +199,8 @@ Result<int> judge_anew(const OrbitRefinement& refinement, const FocalGuess& prio
                radial_px = std::exchange(alignment.radial_px, 0);
   ORBITFUSE_ASSIGN(const TemperatureCheck check, correct_by_temperatures(refinement, alignment));
   // The bundle has left those out that were dropped before it.
-  const bool came_back = not_dropped(alignment).size() > not_dropped(judged).size();
+  const std::vector<std::size_t> bundled = not_dropped(judged), kept = not_dropped(alignment);
+  const bool came_back = !std::includes(bundled.begin(), bundled.end(), kept.begin(), kept.end());
   if (check.moved > 0 || came_back) {
     const Fit before = alignment;
     ORBITFUSE_TRY(

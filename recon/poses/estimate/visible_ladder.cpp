@@ -123,7 +123,7 @@ class VisibleLadder {
       if (!complete() && !all_are_few) ORBITFUSE_TRY(try_more_pairs(quick));
       if (!complete() && limited_) ORBITFUSE_TRY(try_full_settings());
       if (static_cast<double>(missing().size()) < share_worth_affine_shapes * total_) return {};
-      return try_affine_features(ModelSelection::more_views);
+      return try_affine_features(holds_more);
     };
     return spared(attempted());
   }
@@ -264,8 +264,11 @@ class VisibleLadder {
     return weakest_sure_joint(model, weakly_held(model));
   }
   static bool hangs_together(const Reconstruction& now, const Reconstruction& before) {
-    return now.views.size() >= before.views.size() &&
-           sure_joint(now).share > sure_joint(before).share;
+    return now.views.size() >= before.views.size() && sure_joint(before).loose() &&
+           !sure_joint(now).loose();
+  }
+  static bool holds_more(const Reconstruction& now, const Reconstruction& before) {
+    return ModelSelection::more_views(now, before) || hangs_together(now, before);
   }
 
   /// Two parts of the best model that few points join: by more pairs, then by more features.

@@ -24,7 +24,7 @@ struct Joint {
   /// Right models of seventeen sessions have 0.30 and more of all points, those of forty have 0.29
   /// and more of the points of three views. `fox`, whose second walk was 28 % of the extent off
   /// with each half right in itself, had 0.13 of all; `five_drums` 93, cut off after 21 photos and
-  /// bent by 5 %, had 0.39 of all and 0.08 of those of three (docs/notes/poses_visible.md).
+  /// bent by 3.5 %, had 0.39 of all and 0.08 of those of three (docs/notes/poses_visible.md).
   bool loose() const { return share < 0.2; }
 };
 

@@ -21,10 +21,11 @@ struct Gathered {
   std::vector<const PosedView*> posed;  ///< the photo of each
 };
 
+/// As far ahead of each camera as the cameras look: known poses come without points.
 Eigen::Vector3d looked_at(const Reconstruction& model) {
   std::vector<Rigid3d> cameras;
   for (const PosedView& view : model.views) cameras.push_back(view.cam_from_world);
-  return scene_ball(cameras, {}).center;
+  return {0, 0, scene_ball(cameras, {}).radius};
 }
 
 /// A frame of the camera that took most: one odd file doesn't decide for all.
@@ -52,10 +53,10 @@ Result<Gathered> gather(const Session& session, const Reconstruction& visible, c
       const auto v = static_cast<std::size_t>(o.view);
       seen[v].push_back(visible.views[v].cam_from_world * point.position);
     }
-  // Known poses come without points: the rig sees the object as far off as the cameras look.
-  if (visible.points.empty())
-    for (std::size_t v = 0; v < visible.views.size(); ++v)
-      seen[v].push_back(visible.views[v].cam_from_world * looked_at(visible));
+  if (visible.points.empty()) {
+    const Eigen::Vector3d ahead = looked_at(visible);
+    for (auto& points : seen) points.push_back(ahead);
+  }
   Gathered result;
   for (const auto& [photo, thermal] : rig.pairs) {
     const auto found = view_of.find(photo->file);
@@ -95,9 +96,9 @@ Result<ThermalPoses> pose_by_rig(const Session& session, const Reconstruction& v
   result.reconstruction.modality = Modality::thermal;
   const auto frames = session.frames_of(Modality::thermal, false);
   result.frame_count = step.total = static_cast<int>(frames.size());
-  const LensGuess lens = lens_of(session, usual_frame(rig));
-  ORBITFUSE_ASSIGN(const Gathered gathered,
-                   gather(session, visible, rig, usual_frame(rig), result));
+  const FrameRecord& usual = usual_frame(rig);
+  const LensGuess lens = lens_of(session, usual);
+  ORBITFUSE_ASSIGN(const Gathered gathered, gather(session, visible, rig, usual, result));
   RigOptions options;
   options.thermal_lens = lens.camera;
   options.focal_relative_sigma = lens.focal_relative_sigma;

@@ -76,8 +76,9 @@ Result<SimilarityRefinement> refine_similarity(
   result.improved = current.is_finite() && current.scale > 0 &&
                     result.agreement_after > result.agreement_before &&
                     result.matches_after > result.matches_before;
-  if (result.improved) result.visible_from_thermal = current;
   result.unseen = !sees_answer(result);
+  if (result.unseen) result.improved = false;  // few patches more of few
+  if (result.improved) result.visible_from_thermal = current;
   return result;
 }
 

@@ -415,6 +415,8 @@ TEST_F(RunnerTest, WhatIsTakenAsItLiesIsLeftOutWhereItWasMadeOfAnEarlierStage) {
   EXPECT_EQ(summary.find("a")->state, StageState::unchanged);
   EXPECT_EQ(summary.find("b")->state, StageState::absent);
   EXPECT_THAT(summary.find("b")->why, HasSubstr("made of an earlier a"));
+  EXPECT_THAT(summary.find("b")->output.warnings,
+              ElementsAre(HasSubstr("left out, for it was made of an earlier a")));
   EXPECT_TRUE(runs.empty()) << "c reads b";
 }
 

@@ -459,6 +459,27 @@ TEST(Measure, APolygonHoldsWhatItsViewShows) {
   EXPECT_LT((*answer.position - Eigen::Vector3d(0.4, 0, 0)).norm(), 0.02);
 }
 
+TEST(Measure, APolygonBeyondThePictureIsRefused) {
+  const ThermalScene scene = box_orbit();
+  Request request;
+  request.kind = Kind::polygon;
+  for (const auto& [u, v] : {std::pair(100, 60), {900, 60}, {900, 100}, {100, 100}})
+    request.places.emplace_back(PixelPlace{scene.frames()[0].view.name, {u, v}});
+  const auto answer = measure(scene, request, {});
+  ASSERT_FALSE(answer);
+  EXPECT_THAT(answer.error().message(), HasSubstr("outside of the picture"));
+}
+
+TEST(Measure, AViewRenderedOfAnEarlierWorldIsNamed) {
+  SceneParts parts = box_parts();
+  parts.outdated = {"007"};
+  Request request;
+  request.places = {PixelPlace{"007", {10, 10}}};
+  const auto answer = measure(box_orbit(std::move(parts)), request, {});
+  ASSERT_FALSE(answer);
+  EXPECT_THAT(answer.error().message(), HasSubstr("before poses or fields were made anew"));
+}
+
 /// Its corners as places of the scene: as the frame shows them that sees all of them.
 TEST(Measure, APolygonOfPointsIsWhatTheyEnclose) {
   const ThermalScene scene = box_orbit();

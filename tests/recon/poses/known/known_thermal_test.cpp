@@ -153,6 +153,20 @@ TEST_F(KnownThermal, ADeclaredRigWithoutPairsIsPosedApartWithAWord) {
   EXPECT_FALSE(poses->ladder.front().held);
 }
 
+TEST_F(KnownThermal, OfAWorldWithoutPhotosTheyAreTakenAndToldUnchecked) {
+  for (std::size_t i = 0; i < 12; ++i) session_.frames[i].cam_from_world.reset();
+  const auto poses = estimate();
+  ASSERT_TRUE(poses) << poses.error().message();
+  EXPECT_FALSE(poses->shares_visible_frame);
+  EXPECT_EQ(poses->reconstruction.views.size(), 12u);
+  ASSERT_EQ(poses->warnings.size(), 1u);
+  EXPECT_THAT(poses->warnings[0], HasSubstr("nothing checks the known thermal poses"));
+  for (std::size_t i = 14; i < 24; ++i) session_.frames[i].cam_from_world.reset();
+  const auto few = estimate();
+  ASSERT_TRUE(few) << few.error().message();
+  EXPECT_THAT(few->warnings.front(), HasSubstr("2 of 12 thermal frames have a known pose"));
+}
+
 TEST_F(KnownThermal, RendersAreAskedForWhereTheyCanSayAnything) {
   EXPECT_TRUE(asks_for_renders(session_, options_));
   options_.check_known_poses = false;
