@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // bench_visible SCENE... [--focal-error R] [--no-stations] [--no-focal] [--colmap | --global]
-// [--views]: poses of the visible views alone, and their error where the truth is known; --views:
-// of each view. A scene is one of shared data's orbits (container, sedan, van, fox, flowerpot,
+// [--first N] [--views]: poses of the visible views alone, and their error where the truth is
+// known; --views: of each view; --first: of an orbit cut off after N photos. A scene is one of
+// shared data's orbits (container, sedan, van, fox, flowerpot,
 // ...), one of its pairs (metu_sunny_scene_7, ...), or the whole path of a folder like those.
 // --colmap poses with COLMAP's mapper on all pairs at full settings instead, --global by the global
 // mapper on the orbit's pairs alone.
@@ -36,6 +37,7 @@ struct Request {
   std::vector<std::string> scenes;
   double focal_error = 0.03;
   bool stations = true, focal = true, colmap = false, global = false, views = false;
+  std::size_t first = 0;  ///< photos; 0: all
 };
 
 /// Visible images of a folder, or of its folder visible/, in the order of their names.
@@ -78,6 +80,8 @@ scenes::Scene load(const fs::path& data, const std::string& which, const Request
   }
   std::erase_if(scene.session.frames,
                 [](const FrameRecord& frame) { return frame.modality != Modality::visible; });
+  if (request.first > 0 && request.first < scene.session.frames.size())
+    scene.session.frames.resize(request.first);
   if (!request.stations)
     for (FrameRecord& frame : scene.session.frames) frame.station.reset();
   if (!request.focal)
@@ -215,6 +219,8 @@ Request parsed(int argc, char** argv) {
       request.colmap = true;
     else if (word == "--global")
       request.global = true;
+    else if (word == "--first" && i + 1 < argc)
+      request.first = std::strtoul(argv[++i], nullptr, 10);
     else if (word == "--views")
       request.views = true;
     else
@@ -232,9 +238,7 @@ int main(int argc, char** argv) {
   if (request.scenes.empty() || !fs::exists(data)) {
     std::fputs(
         "bench_visible SCENE... [--focal-error R] [--no-stations] [--no-focal] [--colmap | "
-        "--global] [--views]; "
-        "needs "
-        "the shared data (ORBITFUSE_SHARED)\n",
+        "--global] [--first N] [--views]; needs the shared data (ORBITFUSE_SHARED)\n",
         stderr);
     return 2;
   }

@@ -484,6 +484,7 @@ class VisibleLadder {
           poses.reconstruction.views.size(), total_, 100 * options_.min_posed_ratio));
     ORBITFUSE_TRY(spared(doubt_placed_elsewhere(poses)));
     doubt_loose_part(poses);
+    doubt_minority(poses.reconstruction, poses.doubtful);
     const auto all = static_cast<int>(exhaustive_pairs(total_).size()),
                pairs = selection_.best_level().pairs();
     if (pairs < all)

@@ -107,4 +107,14 @@ void doubt_beyond(const Joint& joint, const Reconstruction& model,
   }
 }
 
+void doubt_minority(const Reconstruction& model, std::vector<DoubtfulView>& doubtful) {
+  const std::size_t doubted = doubtful.size();
+  if (2 * doubted <= model.views.size()) return;
+  for (const PosedView& view : model.views)
+    add_doubt({view.name, DoubtReason::uncertain_place,
+               fmt::format("{} of {} views are in doubt, and nothing says that the others hold",
+                           doubted, model.views.size())},
+              doubtful);
+}
+
 }  // namespace orbitfuse

@@ -100,6 +100,21 @@ TEST(WeaklyHeld, BeyondALooseJointAllAreDoubtedOnce) {
   EXPECT_TRUE(doubtful.empty());
 }
 
+TEST(WeaklyHeld, AMinorityVouchesForNothing) {
+  const Reconstruction model = chain(5, 200, 60);
+  std::vector<DoubtfulView> doubtful;
+  for (const int v : {0, 3})
+    doubtful.push_back(
+        {model.views[static_cast<std::size_t>(v)].name, DoubtReason::few_common_points, "before"});
+  doubt_minority(model, doubtful);
+  EXPECT_EQ(doubtful.size(), 2u);
+  doubtful.push_back({model.views[1].name, DoubtReason::few_common_points, "before"});
+  doubt_minority(model, doubtful);
+  ASSERT_EQ(doubtful.size(), 5u);
+  EXPECT_EQ(doubtful[0].why, "before");
+  EXPECT_THAT(doubtful[4].why, HasSubstr("3 of 5 views are in doubt"));
+}
+
 TEST(WeaklyHeld, TwoViewsHaveNoThirdToAsk) {
   EXPECT_TRUE(weakly_held(chain(2, 3, 0)).empty());
   EXPECT_TRUE(weakly_held({}).empty());
