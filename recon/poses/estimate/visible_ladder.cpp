@@ -88,7 +88,7 @@ class VisibleLadder {
     if (!complete()) ORBITFUSE_TRY(improve(level, all_are_few));
     selection_.take_part();
     if (selection_.has_best() && steps_.size() > 1) ORBITFUSE_TRY(spared(try_all_matches()));
-    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_firmer_joint()));
+    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_joining()));
     if (selection_.has_best() && !complete()) {
       ORBITFUSE_TRY(spared(try_rematching()));
       if (rematched_)
@@ -96,6 +96,7 @@ class VisibleLadder {
             spared(try_resection(selection_.best_level(), "resection on points matched again")));
     }
     if (selection_.has_best()) ORBITFUSE_TRY(spared(try_alignment()));
+    if (selection_.has_best()) ORBITFUSE_TRY(spared(try_firmer_features()));
     return answer();
   }
 
@@ -271,19 +272,21 @@ class VisibleLadder {
     return ModelSelection::more_views(now, before) || hangs_together(now, before);
   }
 
-  /// Two parts of the best model that few points join: by more pairs, then by more features.
-  Status try_firmer_joint() {
-    const Joint joint = sure_joint(selection_.best());
-    if (!joint.loose()) return {};
-    ORBITFUSE_TRY(spared(try_joining(joint)));
+  /// What is loose still when all matches have been made again: by more features.
+  Status try_firmer_features() {
     if (asked_affine_ || !sure_joint(selection_.best()).loose()) return {};
     ORBITFUSE_TRY(try_affine_features(hangs_together));
-    return affine_ && &selection_.best_level() == &*affine_ ? try_all_matches() : Status{};
+    if (!affine_ || &selection_.best_level() != &*affine_) return {};
+    rematched_ = false;
+    ORBITFUSE_TRY(try_all_matches());
+    return try_alignment();
   }
 
-  /// On the likeliest pairs across.
-  Status try_joining(const Joint& joint) {
+  /// Two parts of the best model that few points join, on the likeliest pairs across.
+  Status try_joining() {
     const Reconstruction& best = selection_.best();
+    const Joint joint = sure_joint(best);
+    if (!joint.loose()) return {};
     const std::string attempt = "pairs across a loose joint";
     tell(1, "matches of the " + attempt);
     ORBITFUSE_ASSIGN(const FeatureGraph graph, selection_.best_level().graph());
