@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "core/geometry/seen_by_some.hpp"
 #include "recon/poses/doubts.hpp"
 #include "recon/poses/estimate/center_uncertainty.hpp"
 #include "recon/poses/index.hpp"
@@ -68,28 +69,19 @@ std::vector<DoubtfulView> weakly_held(const Reconstruction& model,
 }
 
 Joint weakest_sure_joint(const Reconstruction& model, const std::vector<DoubtfulView>& doubtful) {
-  Joint joint = weakest_joint(model);
+  const Joint joint = weakest_joint(model);
   if (doubtful.empty()) return joint;
   std::set<std::string> doubted;
   for (const DoubtfulView& view : doubtful) doubted.insert(view.name);
-  Reconstruction sure;
-  std::vector<int> sure_index(model.views.size(), -1);
-  for (std::size_t v = 0; v < model.views.size(); ++v) {
-    if (doubted.contains(model.views[v].name)) continue;
-    sure_index[v] = static_cast<int>(sure.views.size());
-    sure.views.push_back(model.views[v]);
-  }
-  for (SparsePoint point : model.points) {
-    std::erase_if(point.track, [&](const Observation& o) { return sure_index[at(o.view)] < 0; });
-    for (Observation& o : point.track) o.view = sure_index[at(o.view)];
-    sure.points.push_back(std::move(point));
-  }
-  Joint of_sure = weakest_joint(sure);
+  std::vector<char> sure(model.views.size(), 1);
+  for (std::size_t v = 0; v < sure.size(); ++v)
+    if (doubted.contains(model.views[v].name)) sure[v] = 0;
+  Joint of_sure = weakest_joint(part_of(model, sure));
   if (of_sure.share >= joint.share) return joint;
-  joint.beyond.assign(model.views.size(), 0);
-  for (std::size_t v = 0; v < model.views.size(); ++v)
-    if (sure_index[v] >= 0) joint.beyond[v] = of_sure.beyond[at(sure_index[v])];
-  of_sure.beyond = std::move(joint.beyond);
+  std::vector<char> beyond(model.views.size(), 0);
+  for (std::size_t v = 0, next = 0; v < sure.size(); ++v)
+    if (sure[v] != 0) beyond[v] = of_sure.beyond[next++];
+  of_sure.beyond = std::move(beyond);
   return of_sure;
 }
 
